@@ -1,0 +1,1 @@
+"""jaxsub: differentiable models of vehicles that move in water."""
