@@ -1,0 +1,156 @@
+"""What an effect is: a small module that adds a force, changes an actuator or changes a sensor."""
+
+import abc
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any, ClassVar, Self
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..parameters import Parameter
+from .motion import Facts, Motion
+
+
+def amplitude(unit: str, sign: int = 0, default: float = 0.0) -> Any:
+    """A field that the effect is linear in. `sign` +1 or -1 is the only one that physics admits; 0 admits both."""
+    return _field("amplitude", unit, sign, default)
+
+
+def shape(unit: str, sign: int = 0, default: float = 0.0) -> Any:
+    """A field that the effect is not linear in, such as a time constant; candidates lie on a grid of it."""
+    return _field("shape", unit, sign, default)
+
+
+def _field(role: str, unit: str, sign: int, default: float) -> Any:
+    return eqx.field(
+        default_factory=lambda: jnp.asarray(default),
+        converter=jnp.asarray,
+        metadata={"role": role, "unit": unit, "sign": sign},
+    )
+
+
+class AbstractEffect(eqx.Module):
+    """A piece of physics by its name in the vocabulary.
+
+    Concrete effects declare their options (strings, hull sizes) as static fields and their numbers with
+    `amplitude` or `shape`; names, units, admissible signs, reading and writing all follow from those.
+    """
+
+    name: ClassVar[str]
+    family: ClassVar[str]
+
+    @classmethod
+    @abc.abstractmethod
+    def candidates(cls, facts: Facts) -> "Sequence[Self]":
+        """The forms of this effect that make sense on a vehicle, amplitudes zero and shapes on a grid."""
+
+    @property
+    @abc.abstractmethod
+    def where(self) -> tuple[str, ...]:
+        """Equations it acts on, or `input:NAME`, or `sensor:CHANNEL`."""
+
+    @property
+    @abc.abstractmethod
+    def expression(self) -> str:
+        """The added term, as a person would write it."""
+
+    def symbols(self) -> dict[str, str]:
+        """The symbol under which each numeric field is known to the user; the field's own name by default."""
+        return {field.name: field.name for field in number_fields(self)}
+
+    @property
+    def label(self) -> str:
+        """A name that tells apart two forms of one effect, such as `quadratic-damping[roll]`."""
+        chosen = ",".join(value for value in options(self).values() if isinstance(value, str))
+        return f"{self.name}[{chosen}]" if chosen else self.name
+
+    def units(self) -> dict[str, str]:
+        """The unit of each numeric field."""
+        return {field.name: field.metadata["unit"] for field in number_fields(self)}
+
+
+class AbstractForce(AbstractEffect):
+    """An effect that adds generalised forces to the equations of motion."""
+
+    @abc.abstractmethod
+    def force(self, motion: Motion) -> dict[str, Array]:
+        """Generalised force (N or N m) by equation; leading axes follow those of `motion`."""
+
+
+class AbstractActuator(AbstractEffect):
+    """An effect that stands between a command and what the actuator does."""
+
+    actuator: eqx.AbstractVar[str]
+
+    @abc.abstractmethod
+    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+        """What the actuator does at the start, middle and end of each sample interval, given the command there."""
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The actuator."""
+        return (f"input:{self.actuator}",)
+
+
+class AbstractSensor(AbstractEffect):
+    """An effect that stands between a true output and what is recorded of it."""
+
+    channel: eqx.AbstractVar[str]
+
+    @abc.abstractmethod
+    def measure(self, times: Float[Array, " *k"], output: Float[Array, " *k"]) -> Float[Array, " *k"]:
+        """What the sensor shows for the true `output`."""
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The sensor."""
+        return (f"sensor:{self.channel}",)
+
+
+def number_fields(effect: AbstractEffect | type[AbstractEffect]) -> list[dataclasses.Field]:
+    """The numeric fields of an effect, in order."""
+    return [field for field in dataclasses.fields(effect) if "role" in field.metadata]
+
+
+def amplitudes(effect: AbstractEffect | type[AbstractEffect]) -> list[str]:
+    """Names of the fields that the effect is linear in."""
+    return [field.name for field in number_fields(effect) if field.metadata["role"] == "amplitude"]
+
+
+def options(effect: AbstractEffect) -> dict[str, Any]:
+    """The static choices of an effect: its equation, actuator or channel, and fixed sizes."""
+    return {
+        field.name: getattr(effect, field.name)
+        for field in dataclasses.fields(effect)
+        if "role" not in field.metadata
+    }
+
+
+def parameter_table(effect: AbstractEffect) -> dict[str, Parameter]:
+    """A free `Parameter` for each numeric field. Signs are judged after the fit, not forced in it: a fit that wants
+    a negative drag is evidence against the effect, and a bound would hide it."""
+    symbols, units = effect.symbols(), effect.units()
+    rows = {}
+    for field in number_fields(effect):
+        # a shape such as a time constant has no meaning below zero, so there the bound is the physics
+        lower = 0.0 if field.metadata["role"] == "shape" and field.metadata["sign"] > 0 else -math.inf
+        name = f"{effect.label}.{symbols[field.name]}"
+        rows[field.name] = Parameter(name, units[field.name], lower=lower)
+    return rows
+
+
+def admissible(effect: AbstractEffect, values: dict[str, float]) -> bool:
+    """Whether every value has the sign that physics asks of it."""
+    signs = {field.name: field.metadata["sign"] for field in number_fields(effect)}
+    return all(values[name] * sign >= 0.0 for name, sign in signs.items())
+
+
+def with_numbers(effect: AbstractEffect, values: dict[str, Array]) -> Any:
+    """The same effect with other numbers."""
+    names = [field.name for field in number_fields(effect)]
+    return eqx.tree_at(
+        lambda e: [getattr(e, n) for n in names], effect, [jnp.asarray(values.get(n, getattr(effect, n))) for n in names]
+    )

@@ -1,0 +1,307 @@
+"""Hull effects: forces of the water on the body that a linear damping matrix leaves out."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from .base import AbstractForce, amplitude
+from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion
+
+WATER_DENSITY = 1025.0
+
+
+class _PowerDamping(AbstractForce):
+    """Drag on one equation that grows with a power of its own velocity."""
+
+    equation: eqx.AbstractVar[str]
+    coefficient: eqx.AbstractVar[Array]
+    power: eqx.AbstractClassVar[int]
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> Sequence["_PowerDamping"]:
+        """One for each free equation."""
+        return [cls(equation) for equation in facts.equations]  # pyright: ignore[reportCallIssue]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.equation,)
+
+    @property
+    def expression(self) -> str:
+        """The drag term."""
+        velocity = VELOCITIES.get(self.equation, f"{self.equation}'")
+        growth = {2: f"|{velocity}| {velocity}", 3: f"{velocity}³"}[self.power]
+        return f"{self.symbols()['coefficient']} {growth}"
+
+    def symbols(self) -> dict[str, str]:
+        """SNAME symbol such as `K_pp`, `K_ppp`; `D2_roll`, `D3_roll` for a mechanism's coordinate."""
+        if self.equation in VELOCITIES:
+            return {"coefficient": f"{FORCES[self.equation]}_{VELOCITIES[self.equation] * self.power}"}
+        return {"coefficient": f"D{self.power}_{self.equation}"}
+
+    def units(self) -> dict[str, str]:
+        """Force per power of the velocity."""
+        return {"coefficient": _per(self.equation, *(self.equation,) * self.power)}
+
+    def force(self, motion: Motion) -> dict[str, Array]:
+        """The drag along the motion."""
+        rate = motion.rates[self.equation]
+        return {self.equation: self.coefficient * abs(rate) ** (self.power - 1) * rate}
+
+
+class QuadraticDamping(_PowerDamping):
+    r"""Drag that grows with the square of one velocity: $\tau_i = c\,|\nu_i|\nu_i$, with $c \le 0$.
+
+    Source: Fossen, Handbook of Marine Craft Hydrodynamics (2021), §6.4.
+    """
+
+    name: ClassVar[str] = "quadratic-damping"
+    family: ClassVar[str] = "hull"
+    power: ClassVar[int] = 2
+    equation: str = eqx.field(static=True)
+    coefficient: Array = amplitude("1", sign=-1)
+
+
+class CubicDamping(_PowerDamping):
+    r"""Drag that grows with the cube of one velocity: $\tau_i = c\,\nu_i^3$, with $c \le 0$.
+
+    Source: ITTC 7.5-02-07-04.5 for roll; Abkowitz (1964) for the other equations.
+    """
+
+    name: ClassVar[str] = "cubic-damping"
+    family: ClassVar[str] = "hull"
+    power: ClassVar[int] = 3
+    equation: str = eqx.field(static=True)
+    coefficient: Array = amplitude("1", sign=-1)
+
+
+class CrossflowDrag(AbstractForce):
+    r"""Strip-theory drag of the flow across the hull, which couples sway with yaw or heave with pitch.
+
+    $Y = -\tfrac12\rho D C_d \int_{-L/2}^{L/2} |v + xr|(v + xr)\,dx$ and $N = -\tfrac12\rho D C_d \int x\,|v + xr|(v + xr)\,dx$;
+    in the vertical plane with $w - xq$, $Z$ and $M$, the last with the opposite sign. $C_d \ge 0$.
+    Source: Fossen (2021), §6.4.2; Healey and Lienard (1993).
+    """
+
+    name: ClassVar[str] = "crossflow-drag"
+    family: ClassVar[str] = "hull"
+    plane: str = eqx.field(static=True)
+    length: float = eqx.field(static=True)
+    diameter: float = eqx.field(static=True)
+    C_d: Array = amplitude("1", sign=+1)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[CrossflowDrag]":
+        """The planes in which the vehicle is free to both translate and turn."""
+        planes = {"horizontal": {"sway", "yaw"}, "vertical": {"heave", "pitch"}}
+        free = set(facts.equations)
+        return [cls(plane, facts.length, facts.diameter) for plane, needs in planes.items() if needs <= free]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The two equations that the plane couples."""
+        return ("sway", "yaw") if self.plane == "horizontal" else ("heave", "pitch")
+
+    @property
+    def expression(self) -> str:
+        """The integrals."""
+        if self.plane == "horizontal":
+            return "-½ρD C_d ∫ (1, x) |v + x r|(v + x r) dx"
+        return "-½ρD C_d ∫ (1, -x) |w - x q|(w - x q) dx"
+
+    def force(self, motion: Motion) -> dict[str, Array]:
+        """Side force and moment, by Gauss-Legendre quadrature along the hull."""
+        across, turning, arm = ("sway", "yaw", 1.0) if self.plane == "horizontal" else ("heave", "pitch", -1.0)
+        nodes, weights = np.polynomial.legendre.leggauss(16)
+        x, dx = 0.5 * self.length * nodes, 0.5 * self.length * weights
+        local = motion.rates[across][..., None] + arm * x * motion.rates[turning][..., None]
+        strips = -0.5 * WATER_DENSITY * self.diameter * self.C_d * abs(local) * local * dx
+        return {across: jnp.sum(strips, -1), turning: jnp.sum(arm * x * strips, -1)}
+
+
+class CoriolisCoupling(AbstractForce):
+    r"""Products of velocities from rigid body and added mass, beyond those that the linear model keeps.
+
+    With $\tilde M = [M_{11}\,M_{12}; M_{21}\,M_{22}]$ and momentum $p = M_{11}\nu_1 + M_{12}\nu_2$,
+    $h = M_{21}\nu_1 + M_{22}\nu_2$, Kirchhoff gives $C(\nu)\nu = [\nu_2\times p;\; \nu_2\times h + \nu_1\times p]$. This is
+    a quadratic form, so what a linearisation about $(U_c, 0, …)$ leaves out is exactly $-k\,C(\delta\nu)\,\delta\nu$ with
+    $\delta\nu = \nu - (U_c, 0, …)$; physics gives $k = 1$. Source: Fossen (2021), theorem 3.2 and §6.3 (with the Munk moment).
+    """
+
+    name: ClassVar[str] = "coriolis-coupling"
+    family: ClassVar[str] = "hull"
+    equations: tuple[str, ...] = eqx.field(static=True)
+    fraction: Array = amplitude("1", sign=+1)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[CoriolisCoupling]":
+        """One, for a body that can both translate and turn."""
+        moves, turns = set(facts.equations) & set(EQUATIONS[:3]), set(facts.equations) & set(EQUATIONS[3:])
+        return [cls(facts.equations)] if moves and turns else []
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """Every free equation."""
+        return self.equations
+
+    @property
+    def expression(self) -> str:
+        """The quadratic form."""
+        return "-k C(δν) δν, δν = ν - (U_c, 0, 0, 0, 0, 0)"
+
+    def force(self, motion: Motion) -> dict[str, Array]:
+        """Forces and moments of the momentum carried around."""
+        rates = jnp.stack(jnp.broadcast_arrays(*(motion.rates[e] for e in EQUATIONS)), -1)
+        deviation = rates - motion.cruise * jnp.eye(6)[0]
+        momentum = deviation @ motion.inertia.T
+        linear, angular, p, h = deviation[..., :3], deviation[..., 3:], momentum[..., :3], momentum[..., 3:]
+        force = jnp.cross(angular, p)
+        moment = jnp.cross(angular, h) + jnp.cross(linear, p)
+        total = -self.fraction * jnp.concatenate([force, moment], -1)
+        return {e: total[..., i] for i, e in enumerate(EQUATIONS) if e in self.equations}
+
+
+class TurningSpeedLoss(AbstractForce):
+    r"""Surge resistance of manoeuvring: $X = X_{ab}\,a\,b$ for one pair of $v, r, w, q$ or a deflection.
+
+    Squares must not propel ($X_{vv}, X_{rr}, X_{ww}, X_{qq}, X_{\delta\delta} \le 0$); $X_{vr}$ and $X_{wq}$, centripetal
+    in kind, have either sign. Source: Abkowitz (1964); Norrbin (1971).
+    """
+
+    name: ClassVar[str] = "turning-speed-loss"
+    family: ClassVar[str] = "hull"
+    first: str = eqx.field(static=True)
+    second: str = eqx.field(static=True)
+    coefficient: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[TurningSpeedLoss]":
+        """Products of the free velocities in each plane, and the square of each deflection."""
+        if "surge" not in facts.equations:
+            return []
+        planes = [("sway", "yaw"), ("heave", "pitch")]
+        pairs = [(a, b) for plane in planes for a, b in ((plane[0],) * 2, plane, (plane[1],) * 2)]
+        free = [pair for pair in pairs if set(pair) <= set(facts.equations)]
+        fins = [(name, name) for name in facts.actuators if name not in ("thrust", "shaft_speed")]
+        return [cls(*pair) for pair in free + fins]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """Surge."""
+        return ("surge",)
+
+    def symbols(self) -> dict[str, str]:
+        """SNAME symbol such as `X_vr`, or `X_rudder_rudder`."""
+        a, b = self.first, self.second
+        return {"coefficient": f"X_{VELOCITIES[a]}{VELOCITIES[b]}" if a in VELOCITIES else f"X_{a}_{b}"}
+
+    def units(self) -> dict[str, str]:
+        """Force per product."""
+        return {"coefficient": _per("surge", self.first, self.second)}
+
+    @property
+    def expression(self) -> str:
+        """The product."""
+        a, b = (VELOCITIES.get(name, name) for name in (self.first, self.second))
+        return f"{self.symbols()['coefficient']} " + (f"{a}²" if a == b else f"{a} {b}")
+
+    def force(self, motion: Motion) -> dict[str, Array]:
+        """The resistance along the motion."""
+        known = motion.rates | motion.actuators
+        return {"surge": self.coefficient * known[self.first] * known[self.second]}
+
+
+class SpeedScaling(AbstractForce):
+    r"""Lift and rudder forces that grow with speed: $\tau_i = c\,(u - U_c)\,s$ for a velocity or deflection $s$.
+
+    A linear model has $Y_v v$ at $U_c$; lift has $Y_{uv}\,u\,v$. Source: Prestero (2001), §4.5-4.6; Fossen (2021), §9.6.
+    """
+
+    name: ClassVar[str] = "speed-scaling"
+    family: ClassVar[str] = "hull"
+    equation: str = eqx.field(static=True)
+    with_: str = eqx.field(static=True)
+    coefficient: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SpeedScaling]":
+        """Each lateral equation with the velocities and deflections of its own plane."""
+        planes = {"sway": ("sway", "yaw"), "yaw": ("sway", "yaw"), "heave": ("heave", "pitch"), "pitch": ("heave", "pitch")}
+        planes["roll"] = ("roll",)
+        if "surge" not in facts.equations:
+            return []
+        found = [cls(e, s) for e, plane in planes.items() for s in plane if {e, s} <= set(facts.equations)]
+        rudders = [cls(e, a) for e in ("sway", "yaw") for a in facts.actuators if a == "rudder" and e in facts.equations]
+        planesmen = [
+            cls(e, a) for e in ("heave", "pitch") for a in facts.actuators if "elevator" in a or a == "stern_plane"
+            if e in facts.equations
+        ]  # fmt: skip
+        return found + rudders + planesmen
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.equation,)
+
+    def symbols(self) -> dict[str, str]:
+        """SNAME symbol such as `N_ur` or `N_u_rudder`."""
+        tail = VELOCITIES.get(self.with_, f"_{self.with_}")
+        return {"coefficient": f"{FORCES[self.equation]}_u{tail}"}
+
+    def units(self) -> dict[str, str]:
+        """Force per product."""
+        return {"coefficient": _per(self.equation, "surge", self.with_)}
+
+    @property
+    def expression(self) -> str:
+        """The product."""
+        return f"{self.symbols()['coefficient']} (u - U_c) {VELOCITIES.get(self.with_, self.with_)}"
+
+    def force(self, motion: Motion) -> dict[str, Array]:
+        """The extra lift along the motion."""
+        known = motion.rates | motion.actuators
+        return {self.equation: self.coefficient * (motion.rates["surge"] - motion.cruise) * known[self.with_]}
+
+
+class HullAsymmetry(AbstractForce):
+    r"""A constant side force or moment of a hull that is not quite symmetric: $\tau_i = c$.
+
+    Source: Fossen (2021), §9.4; model tests report it as $Y_*$, $N_*$ (Abkowitz 1964).
+    """
+
+    name: ClassVar[str] = "hull-asymmetry"
+    family: ClassVar[str] = "hull"
+    equation: str = eqx.field(static=True)
+    constant: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[HullAsymmetry]":
+        """Every free equation but surge, where a constant is thrust."""
+        return [cls(e) for e in facts.equations if e in EQUATIONS[1:]]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.equation,)
+
+    def symbols(self) -> dict[str, str]:
+        """SNAME symbol such as `Y_0`."""
+        return {"constant": f"{FORCES[self.equation]}_0"}
+
+    def units(self) -> dict[str, str]:
+        """A force or a moment."""
+        return {"constant": _per(self.equation)}
+
+    @property
+    def expression(self) -> str:
+        """The constant."""
+        return self.symbols()["constant"]
+
+    def force(self, motion: Motion) -> dict[str, Array]:
+        """The constant, along the motion."""
+        return {self.equation: self.constant + 0.0 * motion.rates[self.equation]}

@@ -1,0 +1,63 @@
+"""What a force, an actuator or a sensor may look at: the motion at one time, or along a whole run."""
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+EQUATIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+VELOCITIES = dict(zip(EQUATIONS, "uvwpqr", strict=True))
+FORCES = dict(zip(EQUATIONS, "XYZKMN", strict=True))
+GRAVITY = 9.80665
+CHANNEL_UNITS = (
+    dict.fromkeys(("u", "v", "w", "speed", "depth_rate"), "m/s")
+    | dict.fromkeys(("p", "q", "r", "heading_rate"), "rad/s")
+    | dict.fromkeys(("phi", "theta", "psi"), "rad")
+    | dict.fromkeys(("x", "y", "z", "depth"), "m")
+    | dict.fromkeys(("ax", "ay", "az"), "m/s/s")
+)
+
+
+class Motion(eqx.Module):
+    """The state of a vehicle and what acts on it, by name; every leaf may carry leading (time) axes.
+
+    **Fields**
+
+    - `rates`: velocity of each equation of motion (m/s or rad/s): all six of a submerged body, also the locked ones.
+    - `positions`: `phi theta psi x y z`, or a mechanism's coordinates (m or rad).
+    - `actuators`: deflections and speeds by actuator name (rad, rad/s, N).
+    - `environment`: recorded surroundings, such as `density` (kg/m³).
+    - `inertia`: (n, n) mass matrix of the equations in `rates`.
+    - `buoyancy`: displaced weight (N); zero for a mechanism.
+    - `cruise`: the operating speed U_c (m/s) about which linear coefficients were taken.
+    """
+
+    rates: dict[str, Array]
+    positions: dict[str, Array]
+    actuators: dict[str, Array]
+    environment: dict[str, Array]
+    inertia: Float[Array, "n n"]
+    buoyancy: Array | float
+    cruise: Array | float
+
+
+class Facts(eqx.Module):
+    """What the vocabulary needs to know of a vehicle and its recordings to list its candidates.
+
+    **Fields**
+
+    - `kind`: `submerged-body` or `mechanism`.
+    - `equations`: the free equations of motion.
+    - `actuators`, `channels`, `environment`: names of what is recorded.
+    - `length`, `diameter`: of the hull, m (zero for a mechanism).
+    - `rate_scale`: rms velocity of each free equation along the recordings.
+    - `sample_interval`: the recordings' median, s.
+    """
+
+    kind: str
+    equations: tuple[str, ...]
+    actuators: tuple[str, ...]
+    channels: tuple[str, ...]
+    environment: tuple[str, ...]
+    length: float
+    diameter: float
+    rate_scale: dict[str, float]
+    sample_interval: float

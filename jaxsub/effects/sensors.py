@@ -1,0 +1,87 @@
+"""Sensor effects: what stands between the truth and its recording."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from .base import AbstractSensor, amplitude
+from .motion import CHANNEL_UNITS, Facts
+
+
+class SensorBias(AbstractSensor):
+    r"""A constant error: $z = y + b$. Source: Titterton and Weston (2004), §4."""
+
+    name: ClassVar[str] = "sensor-bias"
+    family: ClassVar[str] = "sensors"
+    channel: str = eqx.field(static=True)
+    bias: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SensorBias]":
+        """One for each channel."""
+        return [cls(channel) for channel in facts.channels]
+
+    def units(self) -> dict[str, str]:
+        """The channel's own."""
+        return {"bias": CHANNEL_UNITS.get(self.channel, "1")}
+
+    @property
+    def expression(self) -> str:
+        """The bias."""
+        return f"{self.channel} measured = {self.channel} + b"
+
+    def measure(self, times: Float[Array, " *k"], output: Float[Array, " *k"]) -> Float[Array, " *k"]:
+        """The biased output."""
+        return output + self.bias
+
+
+class SensorScale(AbstractSensor):
+    r"""A wrong scale: $z = (1 + s)\,y$. Source: Titterton and Weston (2004), §4."""
+
+    name: ClassVar[str] = "sensor-scale"
+    family: ClassVar[str] = "sensors"
+    channel: str = eqx.field(static=True)
+    scale: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SensorScale]":
+        """One for each channel."""
+        return [cls(channel) for channel in facts.channels]
+
+    @property
+    def expression(self) -> str:
+        """The scale."""
+        return f"{self.channel} measured = (1 + s) {self.channel}"
+
+    def measure(self, times: Float[Array, " *k"], output: Float[Array, " *k"]) -> Float[Array, " *k"]:
+        """The scaled output."""
+        return (1.0 + self.scale) * output
+
+
+class SensorDrift(AbstractSensor):
+    r"""An error that grows with time: $z = y + d\,(t - t_0)$. Source: Titterton and Weston (2004), §4."""
+
+    name: ClassVar[str] = "sensor-drift"
+    family: ClassVar[str] = "sensors"
+    channel: str = eqx.field(static=True)
+    drift: Array = amplitude("1/s")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SensorDrift]":
+        """One for each channel."""
+        return [cls(channel) for channel in facts.channels]
+
+    def units(self) -> dict[str, str]:
+        """The channel's own, per second."""
+        return {"drift": f"{CHANNEL_UNITS.get(self.channel, '1')}/s"}
+
+    @property
+    def expression(self) -> str:
+        """The drift."""
+        return f"{self.channel} measured = {self.channel} + d (t - t_0)"
+
+    def measure(self, times: Float[Array, " *k"], output: Float[Array, " *k"]) -> Float[Array, " *k"]:
+        """The drifting output."""
+        return output + self.drift * (times - times[..., :1])

@@ -1,0 +1,22 @@
+"""The one error a user can cause, and the hint that goes with a misspelt word."""
+
+import difflib
+from collections.abc import Iterable
+
+
+class InputError(ValueError):
+    """Something a user gave is wrong; the command line prints it as one line and exits with 2.
+
+    `where` is the file, row or key, `what` is wrong with it and `remedy` is what to do about it.
+    """
+
+    def __init__(self, where: str, what: str, remedy: str):
+        # Library messages quoted in `what` may span lines; the contract with the user is one line.
+        super().__init__(" ".join(f"{where}: {what}; {remedy}".split()))
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return the entry of `known` spelt most like `word`, or None when nothing is close."""
+    by_lower = {entry.lower(): entry for entry in known}
+    matches = difflib.get_close_matches(word.lower(), by_lower, n=1)
+    return by_lower[matches[0]] if matches else None

@@ -1,0 +1,36 @@
+r"""Output-error likelihood: measured outputs against the free-running model (equations.md §3).
+
+$-\ln p(Z\mid\theta, x_0) = \tfrac12\sum_{r,k,c} m_{rkc}\,(z_{rkc} - \hat y_{rkc}(\theta, x_{0r}))^2/\sigma_c^2 + \sum_c N_c\ln\sigma_c$,
+with m the mask, one free initial state a run, and $\sigma$ given or concentrated out.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..recording.runs import Runs
+from ..simulate import simulate
+from ..vehicle import AbstractVehicle
+
+ANGLES = ("phi", "theta", "psi")
+
+
+def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
+    """Measured minus modelled outputs in SI, zero where nothing was measured; angles wrapped to (-π, π]."""
+    difference = runs.outputs - simulate(vehicle, runs, start)
+    turns = jnp.array([c in ANGLES and vehicle.layout.kind == "submerged-body" for c in vehicle.layout.channels])
+    wrapped = jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
+    return jnp.where(runs.mask, wrapped, 0.0)
+
+
+def concentrated_sigma(error: Float[Array, "r k c"], runs: Runs) -> Float[Array, " c"]:
+    """The standard deviation of each channel that maximises the likelihood given its errors: their rms."""
+    return jnp.sqrt(jnp.sum(error**2, (0, 1)) / jnp.maximum(runs.samples(), 1.0))
+
+
+def negative_log_likelihood(
+    vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"], sigma: Float[Array, " c"] | None = None
+) -> Float[Array, ""]:
+    """-ln p up to its constant; `sigma` (SI, per channel) is concentrated out where it is None."""
+    error = errors(vehicle, runs, start)
+    scale = concentrated_sigma(error, runs) if sigma is None else sigma
+    return 0.5 * jnp.sum((error / scale) ** 2) + jnp.sum(runs.samples() * jnp.log(scale))

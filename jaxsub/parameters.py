@@ -1,0 +1,83 @@
+"""Which leaves of a model are free, within which bounds, under which prior.
+
+A vehicle keeps its numbers in flat dictionaries keyed by name; beside them stands a static table of
+`Parameter` rows that says what an estimator may do with each. Estimators see only the free vector of
+*unconstrained* coordinates that `Transform` makes of it.
+"""
+
+import dataclasses
+import math
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """One named number of a model.
+
+    **Fields**
+
+    - `name`: ASCII SNAME for coefficients, `effect[where].symbol` for an effect's parameter.
+    - `unit`: SI unit as text, empty where the file gives none.
+    - `free`: whether an estimator may move it.
+    - `lower`, `upper`: bounds in SI, infinite where there are none.
+    - `prior_std`: standard deviation of a Gaussian prior about `prior_mean`, infinite where there is none.
+    - `prior_mean`: the value that the vehicle file gives.
+    """
+
+    name: str
+    unit: str = ""
+    free: bool = True
+    lower: float = -math.inf
+    upper: float = math.inf
+    prior_std: float = math.inf
+    prior_mean: float = 0.0
+
+
+class Transform(eqx.Module):
+    r"""The bijection between physical values $\theta$ and the estimator's coordinates $y$.
+
+    Without bounds $\theta = \theta_0 + s\,y$; with one bound $\theta = lo + s\,\mathrm{softplus}(y)$ (mirrored for an
+    upper one); with two $\theta = lo + (hi - lo)\,\mathrm{sigmoid}(y)$. $s$ is each coefficient's own size, so that a
+    step of one unit means as much for an added mass of 4000 kg as for a time constant of 0.1 s.
+    """
+
+    lower: Float[Array, " p"]
+    upper: Float[Array, " p"]
+    centre: Float[Array, " p"]
+    scale: Float[Array, " p"]
+
+    @classmethod
+    def of(cls, parameters: list[Parameter], start: np.ndarray) -> "Transform":
+        """The transform for `parameters` about the values `start` (p,); a zero start has unit scale."""
+        start = np.asarray(start, float)
+        lower, upper = (np.array([getattr(p, side) for p in parameters], float) for side in ("lower", "upper"))
+        scale = np.where(start == 0.0, 1.0, np.abs(start))
+        return cls(*(jnp.asarray(a) for a in (lower, upper, start, scale)))
+
+    def to_physical(self, y: Float[Array, " p"]) -> Float[Array, " p"]:
+        """Physical values of the coordinates `y`."""
+        low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
+        soft = self.scale * _softplus(y)
+        lower, upper = jnp.where(low, self.lower, 0.0), jnp.where(high, self.upper, 0.0)
+        both = lower + (upper - lower) / (1.0 + jnp.exp(-y))
+        one = jnp.where(low, lower + soft, upper - soft)
+        return jnp.where(low & high, both, jnp.where(low | high, one, self.centre + self.scale * y))
+
+    def to_free(self, theta: Float[Array, " p"]) -> Float[Array, " p"]:
+        """Coordinates of the physical values `theta`, which are first moved just inside their bounds."""
+        low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
+        lower, upper = jnp.where(low, self.lower, 0.0), jnp.where(high, self.upper, 0.0)
+        width = jnp.where(low & high, upper - lower, 1.0)
+        fraction = jnp.clip((theta - lower) / width, 1e-3, 1.0 - 1e-3)
+        gap = jnp.maximum(jnp.where(low, theta - lower, upper - theta) / self.scale, 1e-3)
+        both = jnp.log(fraction) - jnp.log1p(-fraction)
+        one = gap + jnp.log(-jnp.expm1(-gap))
+        return jnp.where(low & high, both, jnp.where(low | high, one, (theta - self.centre) / self.scale))
+
+
+def _softplus(y: Array) -> Array:
+    return jnp.maximum(y, 0.0) + jnp.log1p(jnp.exp(-jnp.abs(y)))

@@ -1,0 +1,147 @@
+"""Recordings as CSV, Parquet and NetCDF files whose headers are `name` (SI) or `name[unit]`."""
+
+import csv
+import math
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pandas
+import xarray
+from pyarrow import parquet
+
+from jaxsub.errors import InputError, nearest
+from jaxsub.recording.recording import FIRST_ROW, Recording
+from jaxsub.units import TIME, si_columns
+
+Samples = dict[str, np.ndarray]  # by header, in the file's own units
+Table = list[tuple[str, np.ndarray]]  # the same as read, when a header may still occur twice
+
+
+def load(path: str | os.PathLike[str]) -> Recording:
+    """Read a .csv, .parquet or .nc file; the run is named after it.
+
+    Raises InputError, naming the file and where it applies the row and column, whatever the file holds.
+    """
+    path = Path(path)
+    read, _ = _format(path)
+    if not path.is_file():
+        raise InputError(str(path), "is a folder" if path.is_dir() else "no such file", "give the path of a recording")
+    columns = si_columns(str(path), read(path))
+    if TIME not in columns:
+        similar = next((name for name in columns if "time" in name.lower()), None) or nearest(TIME, columns)
+        remedy = f"rename {similar!r} to {TIME!r}" if similar else f"add a column headed {TIME}[s]"
+        raise InputError(str(path), f"has no time column {TIME!r}", remedy)
+    return Recording(path.stem, columns.pop(TIME), columns, str(path))
+
+
+def save(recording: Recording, path: str | os.PathLike[str], units: Mapping[str, str] | None = None) -> None:
+    """Write a .csv, .parquet or .nc file, in SI but for the columns that `units` names a unit for.
+
+    A save that fails leaves an older file as it was. Raises InputError for an unknown extension, column or unit, a
+    column name that the format cannot hold, and a path that cannot be written.
+    """
+    path = Path(path)
+    _, write = _format(path)
+    samples = recording.in_units(units or {})
+    try:
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".jaxsub-") as folder:
+            write(Path(folder) / path.name, samples)
+            os.replace(Path(folder) / path.name, path)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written ({error.strerror or error})", "check its folder") from error
+
+
+def _format(path: Path) -> tuple[Callable[[Path], Table], Callable[[Path, Samples], None]]:
+    if path.suffix.lower() not in _FORMATS:
+        raise InputError(str(path), f"unknown extension {path.suffix!r}", f"use {', '.join(_FORMATS)}")
+    return _FORMATS[path.suffix.lower()]
+
+
+@contextmanager
+def _reading(path: Path, form: str) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # no library promises what it raises on a damaged file
+        raise InputError(str(path), f"cannot be read ({error})", f"check that it is whole and is {form}") from error
+
+
+def _read_csv(path: Path) -> Table:
+    # Not through pandas, which pads short rows and loses the row number of a bad cell.
+    with _reading(path, "UTF-8 text"), path.open(encoding="utf-8-sig", newline="") as file:
+        rows = list(csv.reader(file))
+    while rows and not "".join(rows[-1]).strip():
+        rows.pop()
+    if not rows:
+        raise InputError(str(path), "is empty", "write a header and a row for each sample")
+    header, *body = rows
+    for row, cells in enumerate(body, FIRST_ROW):
+        if len(cells) != len(header):
+            what = f"{len(cells)} cells under {len(header)} headers"
+            raise InputError(f"{path}, row {row}", what, "give every row a cell for each header")
+    return [(name, _numbers(path, name, [cells[i] for cells in body])) for i, name in enumerate(header)]
+
+
+def _numbers(path: Path, header: str, cells: list[str]) -> np.ndarray:
+    values = np.full(len(cells), np.nan)
+    for index, cell in enumerate(cells):
+        try:
+            values[index] = float(cell) if cell.strip() else math.nan
+        except ValueError as error:
+            where = f"{path}, row {index + FIRST_ROW}, column {header!r}"
+            raise InputError(where, f"{cell!r} is not a number", "write a number or leave the cell blank") from error
+    return values
+
+
+def _write_csv(path: Path, samples: Samples) -> None:
+    pandas.DataFrame(samples).to_csv(path, index=False)
+
+
+def _read_parquet(path: Path) -> Table:
+    with _reading(path, "Parquet"), parquet.ParquetFile(path) as file:
+        columns = file.read()
+        table = [(name, column.to_numpy()) for name, column in zip(columns.column_names, columns.columns, strict=True)]
+    return [(name, _numeric(path, name, values)) for name, values in table]
+
+
+def _write_parquet(path: Path, samples: Samples) -> None:
+    pandas.DataFrame(samples).to_parquet(path, index=False)
+
+
+def _read_netcdf(path: Path) -> Table:
+    with _reading(path, "NetCDF 4"), xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
+        variables = file.load().variables
+    table = []
+    for name, variable in variables.items():
+        unit = variable.attrs.get("units")
+        header = f"{name}[{unit}]" if unit is not None and "[" not in str(name) else str(name)
+        table.append((header, _numeric(path, str(name), variable.to_numpy())))
+    return table
+
+
+def _write_netcdf(path: Path, samples: Samples) -> None:
+    dataset = xarray.Dataset()
+    for header, values in samples.items():
+        name, _, unit = header.rstrip("]").partition("[")
+        if not re.fullmatch(r"\w[^/\x00-\x1f\x7f]*", name):
+            raise InputError(f"column {name!r}", "is a name that NetCDF cannot hold", "rename it or write a .csv file")
+        dataset[name] = xarray.Variable(TIME, values, {"units": unit} if unit else {})
+    dataset.to_netcdf(path, engine="h5netcdf")
+
+
+def _numeric(path: Path, header: str, values: np.ndarray) -> np.ndarray:
+    if values.dtype.kind not in "biuf" or values.ndim != 1:
+        what = f"holds {values.ndim}-dimensional {values.dtype} data"
+        raise InputError(f"{path}, column {header!r}", what, "give one number a sample or leave the column out")
+    return values.astype(np.float64)
+
+
+_FORMATS = {
+    ".csv": (_read_csv, _write_csv),
+    ".parquet": (_read_parquet, _write_parquet),
+    ".nc": (_read_netcdf, _write_netcdf),
+}

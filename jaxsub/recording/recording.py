@@ -1,0 +1,141 @@
+"""The samples of one run, in SI units, with every defect that would mislead a fit refused at the door."""
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from jaxsub.errors import InputError, nearest
+from jaxsub.units import TIME, UnknownUnit, check_time_unit, from_si
+
+FIRST_ROW = 2  # in a file the header is row 1
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One run: float64 SI samples on strictly increasing times, NaN for a missing sample.
+
+    `times` is (samples,) in s and `columns` maps a name to (samples,). `source` is the file or process that made the
+    run and `first_row` the row of its first sample there; errors quote both. The arrays are read-only copies.
+    Raises InputError for fewer than two samples, a time that is not finite or not later than the one before, an
+    infinite sample, columns of unequal length, or a name that a file header could not hold.
+    """
+
+    name: str
+    times: np.ndarray
+    columns: dict[str, np.ndarray]
+    source: str
+    first_row: int = FIRST_ROW
+
+    def __post_init__(self):
+        object.__setattr__(self, "times", _read_only(self.times))
+        object.__setattr__(self, "columns", {name: _read_only(values) for name, values in self.columns.items()})
+        self._check_times()
+        for name, values in self.columns.items():
+            self._check_column(name, values)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample, s."""
+        return float(self.times[-1]) - float(self.times[0])
+
+    def column(self, name: str) -> np.ndarray:
+        """Return the samples of one column, (samples,). Raises InputError when there is no such column."""
+        if name in self.columns:
+            return self.columns[name]
+        close = nearest(name, self.columns)
+        remedy = f"did you mean {close!r}?" if close else f"its columns are {', '.join(self.columns) or 'none'}"
+        raise InputError(self.source, f"has no column {name!r}", remedy)
+
+    def inputs(self, names: Sequence[str]) -> np.ndarray:
+        """Return input columns side by side, (samples, len(names)).
+
+        Raises InputError when a column is absent or has a gap, since an input acts between the rows too.
+        """
+        table = np.empty((len(self.times), len(names)))
+        for index, name in enumerate(names):
+            table[:, index] = self.column(name)
+            if (row := self._first(np.isnan(table[:, index]))) is not None:
+                where = f"{self.source}, row {row}, column {name!r}"
+                raise InputError(where, "a gap in an input column", "fill it in or cut the run there")
+        return table
+
+    def between(self, start: float, end: float) -> "Recording":
+        """Return the samples with start <= time <= end, s. Raises InputError when fewer than two are left."""
+        return self.select((self.times >= start) & (self.times <= end))
+
+    def select(self, keep: np.ndarray) -> "Recording":
+        """Return the consecutive samples where `keep` (samples,) is true. Raises InputError for fewer than two."""
+        columns = {name: values[keep] for name, values in self.columns.items()}
+        first_row = self.first_row + int(np.argmax(keep))
+        return replace(self, times=self.times[keep], columns=columns, first_row=first_row)
+
+    def resample(self, times: np.ndarray, held: Collection[str] = ()) -> "Recording":
+        """Return the run at other `times` (samples,), s: linear between samples, but constant for the `held` columns.
+
+        A sample next to a missing one, or outside the run, is missing; a held column lasts beyond the end of the run.
+        Raises InputError when a held column is absent or the times are not increasing.
+        """
+        for name in held:
+            self.column(name)
+        columns = {
+            name: self._hold(values, times) if name in held else self._interpolate(values, times)
+            for name, values in self.columns.items()
+        }
+        return Recording(self.name, times, columns, f"{self.source} (resampled)")
+
+    def in_units(self, units: Mapping[str, str]) -> dict[str, np.ndarray]:
+        """Return times and columns as a file holds them, headed `name[unit]` where `units` gives one, else `name`.
+
+        Raises InputError for an absent column, an unknown unit or a unit of `t` that is not one of time.
+        """
+        samples = {TIME: self.times, **self.columns}
+        headed = {name: f"{name}[{units[name]}]" if name in units else name for name in samples}
+        for name, unit in units.items():
+            where = f"{self.source}, column {name!r}"
+            try:
+                if name == TIME:
+                    check_time_unit(where, unit)
+                samples[name] = from_si(self.times if name == TIME else self.column(name), unit)
+            except UnknownUnit as error:
+                raise InputError(where, str(error), error.remedy) from error
+        return {headed[name]: values for name, values in samples.items()}
+
+    def _hold(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+        before = np.searchsorted(self.times, times, side="right") - 1
+        return np.where(before >= 0, values[before], np.nan)
+
+    def _interpolate(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+        return np.interp(times, self.times, values, left=np.nan, right=np.nan)
+
+    def _first(self, bad: np.ndarray) -> int | None:
+        return self.first_row + int(np.argmax(bad)) if bad.any() else None
+
+    def _check_times(self) -> None:
+        times = self.times
+        if times.ndim != 1 or times.size < 2:
+            raise InputError(self.source, f"has {times.size} samples", "a recording needs at least two")
+        if (row := self._first(~np.isfinite(times))) is not None:
+            raise InputError(f"{self.source}, row {row}", "the time is missing or not finite", "give every row a time")
+        if (row := self._first(times[1:] <= times[:-1])) is not None:
+            before, after = times[row - self.first_row :][:2]
+            what = f"time {after} s does not come after {before} s"
+            raise InputError(f"{self.source}, row {row + 1}", what, "times must increase from row to row")
+
+    def _check_column(self, name: str, values: np.ndarray) -> None:
+        where = f"{self.source}, column {name!r}"
+        if name == TIME or not re.fullmatch(r"[^\s\[\]]([^\[\]]*[^\s\[\]])?", name):
+            raise InputError(where, "cannot be a column name", "head a column name or name[unit]")
+        if values.shape != self.times.shape:
+            what = f"has shape {values.shape} beside {self.times.size} times"
+            raise InputError(where, what, "give one sample for each time")
+        if (row := self._first(np.isinf(values))) is not None:
+            where = f"{self.source}, row {row}, column {name!r}"
+            raise InputError(where, "an infinite sample", "leave the cell blank if it is missing")
+
+
+def _read_only(values: np.ndarray) -> np.ndarray:
+    copy = np.array(values, np.float64)
+    copy.setflags(write=False)
+    return copy

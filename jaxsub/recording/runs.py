@@ -1,0 +1,100 @@
+"""Several recordings as one batch of arrays that simulation and likelihood take."""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from .recording import Recording
+
+
+class Runs(eqx.Module):
+    """R recordings padded to K samples; what is padded has no weight and does not move the state.
+
+    **Fields**
+
+    - `times`: (R, K) s from each run's own start.
+    - `steps`: (S,) the distinct sample intervals, s; `step_of`: (R, K-1) which of them each interval is.
+    - `live`: (R, K-1) false where padded.
+    - `signals`: (R, K, m) input columns; `held`: for each, whether it is held between samples or interpolated.
+    - `outputs`: (R, K, c) measured channels, zero where missing; `mask`: (R, K, c) true where measured.
+    - `names`: of the runs. `substeps`: integration steps in each sample interval.
+    """
+
+    times: Float[Array, "r k"]
+    steps: Float[Array, " s"]
+    step_of: Int[Array, "r k1"]
+    live: Bool[Array, "r k1"]
+    signals: Float[Array, "r k m"]
+    outputs: Float[Array, "r k c"]
+    mask: Bool[Array, "r k c"]
+    held: tuple[bool, ...] = eqx.field(static=True)
+    names: tuple[str, ...] = eqx.field(static=True)
+    substeps: int = eqx.field(static=True, default=1)
+
+    def nodes(self) -> Float[Array, "r k1 3 m"]:
+        """Signals at the start, middle and end of each interval."""
+        start, after = self.signals[:, :-1], self.signals[:, 1:]
+        end = jnp.where(jnp.array(self.held, bool), start, after)
+        return jnp.stack([start, 0.5 * (start + end), end], axis=2)
+
+    def samples(self) -> Float[Array, " c"]:
+        """Measured samples of each channel."""
+        return jnp.sum(self.mask, axis=(0, 1))
+
+
+def stack_runs(
+    recordings: Sequence[Recording],
+    *,
+    held: Sequence[str],
+    interpolated: Sequence[str],
+    channels: Sequence[str],
+    substeps: int = 1,
+) -> Runs:
+    """The batch of `recordings` with those columns as held inputs, interpolated inputs and outputs.
+
+    **Raises** `InputError` for a column that is absent and for a gap in an input column.
+    """
+    length = max(len(r.times) for r in recordings)
+    pad = lambda a, fill: np.concatenate([a, np.broadcast_to(fill, (length - len(a), *a.shape[1:]))])
+    times, signals, outputs, spacing = [], [], [], []
+    for recording in recordings:
+        t = recording.times - recording.times[0]
+        dt = np.diff(t)
+        table = recording.inputs([*held, *interpolated])
+        measured = np.stack([recording.column(name) for name in channels], axis=1)
+        times.append(np.concatenate([t, t[-1] + dt[-1] * np.arange(1, length - len(t) + 1)]))
+        signals.append(pad(table, table[-1]))
+        outputs.append(pad(measured, np.nan))
+        spacing.append(np.concatenate([dt, np.full(length - len(t), -1.0)]))
+    intervals = np.stack(spacing)
+    # differences of float64 times carry rounding noise; intervals alike to that noise share one step
+    noise = 8.0 * np.finfo(float).eps * max(float(np.abs(r.times).max()) for r in recordings)
+    steps, step_of = _group(np.where(intervals > 0.0, intervals, intervals[intervals > 0.0][0]), noise)
+    z = np.stack(outputs)
+    return Runs(
+        jnp.asarray(np.stack(times)),
+        jnp.asarray(steps),
+        jnp.asarray(step_of),
+        jnp.asarray(intervals > 0.0),
+        jnp.asarray(np.stack(signals)),
+        jnp.asarray(np.where(np.isnan(z), 0.0, z)),
+        jnp.asarray(~np.isnan(z)),
+        (True,) * len(held) + (False,) * len(interpolated),
+        tuple(r.name for r in recordings),
+        substeps,
+    )
+
+
+def _group(intervals: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """The distinct values among `intervals` to within `noise` or 1e-9 of themselves, and which one each is."""
+    order = np.argsort(intervals, axis=None)
+    ranked = intervals.ravel()[order]
+    new = np.diff(ranked, prepend=-1.0) > np.maximum(noise, 1e-9 * ranked)
+    group = np.cumsum(new) - 1
+    members = np.bincount(group)
+    which = np.empty(intervals.size, np.int32)
+    which[order] = group
+    return np.bincount(group, ranked) / members, which.reshape(intervals.shape)

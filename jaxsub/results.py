@@ -1,0 +1,11 @@
+"""What became of an estimation: optimistix's results and the failures of this field."""
+
+import optimistix as optx
+
+
+class RESULTS(optx.RESULTS):
+    """Outcomes of a fit. Failures are values, so that they can be masked and counted under `vmap`."""
+
+    nan_start = "The model does not run from these starting values: a residual is not finite there."
+    indefinite_inertia = "The fitted inertia matrix is not positive definite."
+    not_stationary = "The search stopped where the gradient is not small: more steps or another start are needed."

@@ -1,0 +1,94 @@
+"""The model's answer at the samples of recordings."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..recording.runs import Runs
+from ..vehicle import AbstractVehicle
+from ..vehicle.base import stack
+from .exponential import StepTable, exponential_step, step_table
+
+
+class Sampled(eqx.Module):
+    """A vehicle made ready to step: its inverse inertia and the weights of every step length.
+
+    **Fields**
+
+    - `vehicle`: the model.
+    - `inverse`: (n, n) inverse of the inertia matrix.
+    - `table`: weights of the distinct steps of some runs.
+    - `substeps`: steps in each sample interval.
+    """
+
+    vehicle: AbstractVehicle
+    inverse: Float[Array, "n n"]
+    table: StepTable
+    substeps: int = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, vehicle: AbstractVehicle, runs: Runs) -> "Sampled":
+        """`vehicle` made ready for the step lengths of `runs`."""
+        inverse = jnp.linalg.inv(vehicle.mass_matrix())
+        table = step_table(inverse @ vehicle.damping_matrix(), runs.steps / runs.substeps)
+        return cls(vehicle, inverse, table, runs.substeps)
+
+    def step(
+        self, state: Float[Array, " s"], nodes: Float[Array, "3 m"], index: Array, push: Float[Array, "2 n"] | None = None
+    ) -> Float[Array, " s"]:
+        """The state one sample later.
+
+        `index` says which step length; `push` is an extra generalised force (N, N m) at the start and end of the
+        interval, linear between: the port through which a diagnosis asks what a missing force would do.
+        """
+        n = self.inverse.shape[0]
+        extra = None if push is None else jnp.stack([push[0], 0.5 * (push[0] + push[1]), push[1]])
+        full = nodes if extra is None else jnp.concatenate([nodes, extra], axis=1)
+        weights = self.table.at(index)
+
+        def rates(velocity: Array, position: Array, node: Array) -> tuple[Array, Array]:
+            signals, force = (node, 0.0) if extra is None else (node[:-n], node[-n:])
+            motion = self.vehicle.motion(jnp.concatenate([velocity, position]), signals)
+            moved = stack(self.vehicle.position_rates(motion), self.vehicle.layout.positions, velocity[0])
+            return self.inverse @ (self.vehicle.force(motion) + force), moved
+
+        velocity, position = state[:n], state[n:]
+        for part in _subdivide(full, self.substeps):
+            velocity, position = exponential_step(rates, weights, velocity, position, part)
+        return jnp.concatenate([velocity, position])
+
+    def states(self, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
+        """States at the samples of `runs` from the initial states `start`."""
+        nodes = jax.vmap(self.vehicle.actuate)(runs.times, runs.nodes())
+
+        def advance(state: Array, interval: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+            node, index, live = interval
+            after = jnp.where(live, self.step(state, node, index), state)
+            return after, after
+
+        def run(state: Array, node: Array, index: Array, live: Array) -> Array:
+            return jnp.concatenate([state[None], jax.lax.scan(advance, state, (node, index, live))[1]])
+
+        return jax.vmap(run)(start, nodes, runs.step_of, runs.live)
+
+
+def _subdivide(nodes: Array, parts: int) -> list[Array]:
+    """Nodes of `parts` equal pieces of the interval, on the parabola through the three given."""
+    if parts == 1:
+        return [nodes]
+    s = np.arange(2 * parts + 1) / (2.0 * parts)
+    weights = np.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], axis=1)
+    fine = jnp.asarray(weights, nodes.dtype) @ nodes
+    return [fine[2 * i : 2 * i + 3] for i in range(parts)]
+
+
+def simulate(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
+    """What the sensors of `vehicle` show at the samples of `runs`, noise apart, from the initial states `start`."""
+    return measure(vehicle, runs, Sampled.of(vehicle, runs).states(runs, start))
+
+
+def measure(vehicle: AbstractVehicle, runs: Runs, states: Float[Array, "r k s"]) -> Float[Array, "r k c"]:
+    """What the sensors show along `states`; the actuators' own dynamics are seen only through what they did."""
+    return vehicle.measure(runs.times, states, runs.signals)

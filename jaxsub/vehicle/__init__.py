@@ -1,0 +1,22 @@
+"""Vehicles: one model that simulation, likelihood, filters, diagnosis and controllers share."""
+
+from .base import AbstractVehicle, Layout, Output
+from .build import build, require_inertia
+from .mechanism import Mechanism
+from .read import read_vehicle, vehicle_from
+from .submerged_body import SubmergedBody
+from .write import vehicle_text, write_vehicle
+
+__all__ = [
+    "AbstractVehicle",
+    "Layout",
+    "Mechanism",
+    "Output",
+    "SubmergedBody",
+    "build",
+    "read_vehicle",
+    "require_inertia",
+    "vehicle_from",
+    "vehicle_text",
+    "write_vehicle",
+]

@@ -1,0 +1,188 @@
+"""What every vehicle is to the rest of the house: named equations, states, signals and outputs, and effects on top."""
+
+import abc
+import dataclasses
+from typing import Self
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..effects import AbstractActuator, AbstractEffect, AbstractForce, AbstractSensor, Motion
+from ..effects import parameter_table, with_numbers
+from ..parameters import Parameter
+
+
+@dataclasses.dataclass(frozen=True)
+class Output:
+    """A measured channel: its 1-σ sensor noise in SI (None: to be estimated) and an accelerometer's lever arm in m."""
+
+    channel: str
+    sigma: float | None = None
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """The names in a vehicle file: everything about a vehicle that is not a number to estimate.
+
+    **Fields**
+
+    - `name`, `kind`: as in the file.
+    - `equations`: the free equations of motion, in order; `positions`: the position states, in order.
+    - `inputs`, `prescribed`, `environment`: (name in the model, column in the recording) pairs. Inputs are held
+      between samples; the other two are interpolated.
+    - `outputs`: the measured channels.
+    - `parameters`: what may move, how far.
+    - `length`, `diameter`: of the hull, m.
+    """
+
+    name: str
+    kind: str
+    equations: tuple[str, ...]
+    positions: tuple[str, ...]
+    inputs: tuple[tuple[str, str], ...]
+    prescribed: tuple[tuple[str, str], ...]
+    environment: tuple[tuple[str, str], ...]
+    outputs: tuple[Output, ...]
+    parameters: tuple[Parameter, ...]
+    length: float = 0.0
+    diameter: float = 0.0
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Columns that are held between samples."""
+        return tuple(column for _, column in self.inputs)
+
+    @property
+    def interpolated(self) -> tuple[str, ...]:
+        """Columns that are interpolated between samples."""
+        return tuple(column for _, column in (*self.prescribed, *self.environment))
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The measured channels."""
+        return tuple(output.channel for output in self.outputs)
+
+    @property
+    def free(self) -> list[Parameter]:
+        """The parameters that an estimator may move."""
+        return [parameter for parameter in self.parameters if parameter.free]
+
+
+class AbstractVehicle(eqx.Module):
+    r"""Equations of motion $\tilde M\dot\nu = \tilde A\nu + \tau(\nu, \eta, \delta, t)$ with $\tau$ all that is not linear damping.
+
+    A state is [ν of the free equations, positions]; signals are the columns of inputs, prescribed motions and
+    surroundings in that order. All methods take any leading axes.
+    """
+
+    layout: eqx.AbstractVar[Layout]
+    effects: eqx.AbstractVar[tuple[AbstractEffect, ...]]
+
+    @abc.abstractmethod
+    def mass_matrix(self) -> Float[Array, "n n"]:
+        """Inertia of the free equations."""
+
+    @abc.abstractmethod
+    def damping_matrix(self) -> Float[Array, "n n"]:
+        r"""$\tilde A$ of the free equations."""
+
+    @abc.abstractmethod
+    def own_values(self) -> dict[str, Array]:
+        """The vehicle's numbers by name, without its effects'."""
+
+    @abc.abstractmethod
+    def with_own_values(self, values: dict[str, Array]) -> Self:
+        """The same vehicle with other numbers for those named."""
+
+    @abc.abstractmethod
+    def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:
+        """The motion by name."""
+
+    @abc.abstractmethod
+    def own_force(self, motion: Motion) -> dict[str, Array]:
+        """Generalised forces (N, N m) other than linear damping of the free equations and effects."""
+
+    @abc.abstractmethod
+    def position_rates(self, motion: Motion) -> dict[str, Array]:
+        """Rates of the position states."""
+
+    @abc.abstractmethod
+    def channels(self, motion: Motion, acceleration: dict[str, Array]) -> dict[str, Array]:
+        """Every channel the vehicle can produce, before any sensor."""
+
+    def values(self) -> dict[str, Array]:
+        """Every number by name, effects included."""
+        named = dict(self.own_values())
+        for effect in self.effects:
+            named |= {row.name: getattr(effect, field) for field, row in parameter_table(effect).items()}
+        return named
+
+    def with_values(self, values: dict[str, Array]) -> Self:
+        """The same vehicle with other numbers for those named."""
+        vehicle = self.with_own_values(values)
+        effects = []
+        for effect in self.effects:
+            rows = parameter_table(effect)
+            effects.append(with_numbers(effect, {f: values[r.name] for f, r in rows.items() if r.name in values}))
+        return dataclasses.replace(vehicle, effects=tuple(effects))
+
+    def with_effect(self, effect: AbstractEffect) -> Self:
+        """The same vehicle with one effect more, its numbers free."""
+        layout = dataclasses.replace(
+            self.layout, parameters=(*self.layout.parameters, *parameter_table(effect).values())
+        )
+        return dataclasses.replace(self, effects=(*self.effects, effect), layout=layout)
+
+    def without_effect(self, label: str) -> Self:
+        """The same vehicle less the effect of that label."""
+        gone = {row.name for e in self.effects if e.label == label for row in parameter_table(e).values()}
+        layout = dataclasses.replace(
+            self.layout, parameters=tuple(p for p in self.layout.parameters if p.name not in gone)
+        )
+        kept = tuple(e for e in self.effects if e.label != label)
+        return dataclasses.replace(self, effects=kept, layout=layout)
+
+    def force(self, motion: Motion) -> Float[Array, "*k n"]:
+        """All generalised forces (N, N m) other than linear damping, effects included."""
+        total = self.own_force(motion)
+        for effect in self.effects:
+            if isinstance(effect, AbstractForce):
+                for equation, part in effect.force(motion).items():
+                    total[equation] = total.get(equation, 0.0) + part
+        return stack(total, self.layout.equations, motion.rates[self.layout.equations[0]])
+
+    def actuate(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3 m"]) -> Float[Array, "k1 3 m"]:
+        """The signals at the start, middle and end of each interval, after the actuators."""
+        names = [name for name, _ in self.layout.inputs]
+        for effect in self.effects:
+            if isinstance(effect, AbstractActuator):
+                column = names.index(effect.actuator)
+                nodes = nodes.at[:, :, column].set(effect.respond(times, nodes[:, :, column]))
+        return nodes
+
+    def acceleration(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Float[Array, "*k n"]:
+        r"""$\dot\nu$ of the free equations (m/s², rad/s²)."""
+        n = len(self.layout.equations)
+        force = self.force(self.motion(state, signals)) + state[..., :n] @ self.damping_matrix().T
+        return force @ jnp.linalg.inv(self.mass_matrix()).T
+
+    def measure(
+        self, times: Float[Array, " *k"], state: Float[Array, "*k s"], signals: Float[Array, "*k m"]
+    ) -> Float[Array, "*k c"]:
+        """What the sensors show."""
+        motion = self.motion(state, signals)
+        rates = self.acceleration(state, signals) if {"ax", "ay", "az"} & set(self.layout.channels) else None
+        named = {} if rates is None else {e: rates[..., i] for i, e in enumerate(self.layout.equations)}
+        true = self.channels(motion, named)
+        shown = {name: true[name] for name in self.layout.channels}
+        for effect in self.effects:
+            if isinstance(effect, AbstractSensor):
+                shown[effect.channel] = effect.measure(times, shown[effect.channel])
+        return stack(shown, self.layout.channels, times)
+
+
+def stack(named: dict[str, Array], order: tuple[str, ...], like: Array) -> Float[Array, "*k n"]:
+    """The named arrays as one, zero where absent, each broadcast to the shape of `like`."""
+    return jnp.stack([jnp.broadcast_to(named.get(name, 0.0), like.shape) for name in order], -1)

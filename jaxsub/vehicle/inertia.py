@@ -1,0 +1,58 @@
+"""Rigid-body and added inertia."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..effects import EQUATIONS, VELOCITIES
+
+_ROWS = dict(zip("XYZKMN", range(6), strict=True))
+_COLUMNS = dict(zip("uvwpqr", range(6), strict=True))
+RIGID = ("mass", "mass", "mass", "I_x", "I_y", "I_z")
+
+
+class Inertia(eqx.Module):
+    r"""$\tilde M = M_{RB} - \{X_{\dot u}, …, N_{\dot r}\}$ about the centre of gravity (equations.md §1).
+
+    Potential flow makes the added mass symmetric, so a coefficient given on one side only (`Y_rdot`) stands for its
+    twin (`N_vdot`) too; where a source prints both, both are kept as printed.
+
+    **Fields**
+
+    - `rigid`: `mass` kg, `I_x I_y I_z` kg m².
+    - `added`: coefficients such as `Y_vdot`, SI.
+    """
+
+    rigid: dict[str, Float[Array, ""]]
+    added: dict[str, Float[Array, ""]]
+
+    def matrix(self) -> Float[Array, "6 6"]:
+        """The 6 × 6 inertia matrix."""
+        matrix = jnp.diag(jnp.stack([self.rigid[name] for name in RIGID]))
+        for name, value in self.added.items():
+            row, column = _ROWS[name[0]], _COLUMNS[name[2]]
+            matrix = matrix.at[row, column].add(-value)
+            if row != column and twin(name) not in self.added:
+                matrix = matrix.at[column, row].add(-value)
+        return matrix
+
+
+def twin(name: str) -> str:
+    """The coefficient that potential flow makes equal: `Y_rdot` for `N_vdot`."""
+    row, column = _ROWS[name[0]], _COLUMNS[name[2]]
+    return f"{'XYZKMN'[column]}_{'uvwpqr'[row]}dot"
+
+
+def indefinite(matrix: np.ndarray, equations: tuple[str, ...], names: list[str]) -> list[str]:
+    """The coefficients that make `matrix` (n, n) indefinite; empty where its symmetric part is positive definite.
+
+    They are those in the rows that dominate the eigenvector of the most negative eigenvalue.
+    """
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
+    if values[0] > 0.0:
+        return []
+    weight = np.abs(vectors[:, 0])
+    guilty = [equations[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]
+    letters = {VELOCITIES.get(e, e) for e in guilty} | {"XYZKMN"[EQUATIONS.index(e)] for e in guilty if e in EQUATIONS}
+    return [n for n in names if n[0] in letters or n[2:].removesuffix("dot") in letters] or list(guilty)

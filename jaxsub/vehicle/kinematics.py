@@ -1,0 +1,46 @@
+"""From body velocities to rates of attitude and position."""
+
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from ..effects import Motion
+
+
+def position_rates(motion: Motion) -> dict[str, Array]:
+    r"""Euler rates and velocity over ground (equations.md §1).
+
+    $\dot\psi = (q\sin\phi + r\cos\phi)/\cos\theta$, $\dot\theta = q\cos\phi - r\sin\phi$,
+    $\dot\phi = p + \dot\psi\sin\theta$, and $[\dot x\,\dot y\,\dot z] = R(\phi,\theta,\psi)[u\,v\,w]$ with z down.
+    """
+    u, v, w, p, q, r = (motion.rates[e] for e in ("surge", "sway", "heave", "roll", "pitch", "yaw"))
+    phi, theta, psi = (motion.positions[name] for name in ("phi", "theta", "psi"))
+    sin_phi, cos_phi, sin_theta, cos_theta = jnp.sin(phi), jnp.cos(phi), jnp.sin(theta), jnp.cos(theta)
+    turning = (q * sin_phi + r * cos_phi) / cos_theta
+    across = v * cos_phi - w * sin_phi
+    ahead = u * cos_theta + (v * sin_phi + w * cos_phi) * sin_theta
+    return {
+        "psi": turning,
+        "theta": q * cos_phi - r * sin_phi,
+        "phi": p + turning * sin_theta,
+        "x": ahead * jnp.cos(psi) - across * jnp.sin(psi),
+        "y": ahead * jnp.sin(psi) + across * jnp.cos(psi),
+        "z": -u * sin_theta + (v * sin_phi + w * cos_phi) * cos_theta,
+    }
+
+
+def specific_force(motion: Motion, acceleration: dict[str, Array], arm: tuple[float, float, float]) -> dict[str, Array]:
+    r"""What an accelerometer at `arm` (m from the centre of gravity, body axes) shows, m/s².
+
+    $f = \dot\nu_1 + \nu_2\times\nu_1 + \dot\nu_2\times l + \nu_2\times(\nu_2\times l) - R^T g$.
+    """
+    stack = lambda named, keys: jnp.stack(jnp.broadcast_arrays(*(named[k] for k in keys)), -1)
+    linear, angular = stack(motion.rates, ("surge", "sway", "heave")), stack(motion.rates, ("roll", "pitch", "yaw"))
+    linear_rate = stack(acceleration, ("surge", "sway", "heave"))
+    angular_rate = stack(acceleration, ("roll", "pitch", "yaw"))
+    phi, theta = motion.positions["phi"], motion.positions["theta"]
+    down = stack({"x": -jnp.sin(theta), "y": jnp.sin(phi) * jnp.cos(theta), "z": jnp.cos(phi) * jnp.cos(theta)}, "xyz")
+    lever = jnp.asarray(arm)
+    centripetal = jnp.cross(angular, jnp.cross(angular, jnp.broadcast_to(lever, angular.shape)))
+    tangential = jnp.cross(angular_rate, jnp.broadcast_to(lever, angular.shape))
+    total = linear_rate + jnp.cross(angular, linear) + tangential + centripetal - 9.80665 * down
+    return {"ax": total[..., 0], "ay": total[..., 1], "az": total[..., 2]}

@@ -1,0 +1,81 @@
+"""A mechanism of n coordinates: a rig, a roll decay, a servo."""
+
+import dataclasses
+from typing import Self
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..effects import AbstractEffect, Motion
+from .base import AbstractVehicle, Layout
+
+
+class Mechanism(AbstractVehicle):
+    r"""$\sum_j I_{ij}\ddot q_j + D_{ij}\dot q_j + K_{ij}q_j = \sum_a B_{ia}u_a + F_i$ for n coordinates q.
+
+    Names: `I_q`, `D_q`, `K_q` on the diagonal, `I_q_s` off it (symmetric); `B_q_drive` for the actuator `drive`;
+    `F_q` for a constant. Absent means 0, for `I_q` 1.
+
+    **Fields**
+
+    - `coefficients`: SI, or any consistent units where the inertia is scaled to 1.
+    """
+
+    coefficients: dict[str, Float[Array, ""]]
+    layout: Layout = eqx.field(static=True)
+    effects: tuple[AbstractEffect, ...] = ()
+
+    def mass_matrix(self) -> Float[Array, "n n"]:
+        """I."""
+        return self._matrix("I", diagonal=1.0)
+
+    def damping_matrix(self) -> Float[Array, "n n"]:
+        """-D."""
+        return -self._matrix("D")
+
+    def own_values(self) -> dict[str, Array]:
+        """The coefficients."""
+        return self.coefficients
+
+    def with_own_values(self, values: dict[str, Array]) -> Self:
+        """The same mechanism with other coefficients for those named."""
+        updated = {name: jnp.asarray(values.get(name, old)) for name, old in self.coefficients.items()}
+        return dataclasses.replace(self, coefficients=updated)
+
+    def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:
+        """Rates and positions by coordinate."""
+        equations, n = self.layout.equations, len(self.layout.equations)
+        rates = {e: state[..., i] for i, e in enumerate(equations)}
+        positions = {e: state[..., n + i] for i, e in enumerate(equations)}
+        columns = [name for name, _ in self.layout.inputs]
+        environment = [name for name, _ in (*self.layout.prescribed, *self.layout.environment)]
+        actuators = {name: signals[..., i] for i, name in enumerate(columns)}
+        surroundings = {name: signals[..., len(columns) + i] for i, name in enumerate(environment)}
+        return Motion(rates, positions, actuators, surroundings, self.mass_matrix(), 0.0, 0.0)
+
+    def own_force(self, motion: Motion) -> dict[str, Array]:
+        """Springs, drives and constants."""
+        stiffness, total = self._matrix("K"), {}
+        for i, e in enumerate(self.layout.equations):
+            spring = sum(stiffness[i, j] * motion.positions[s] for j, s in enumerate(self.layout.equations))
+            drive = sum(self._value(f"B_{e}_{a}") * signal for a, signal in motion.actuators.items())
+            total[e] = self._value(f"F_{e}") - spring + drive
+        return total
+
+    def position_rates(self, motion: Motion) -> dict[str, Array]:
+        """The rates themselves."""
+        return motion.rates
+
+    def channels(self, motion: Motion, acceleration: dict[str, Array]) -> dict[str, Array]:
+        """Each coordinate `q` and its rate `q_rate`."""
+        return motion.positions | {f"{name}_rate": rate for name, rate in motion.rates.items()}
+
+    def _value(self, name: str) -> Array:
+        return self.coefficients.get(name, jnp.zeros(()))
+
+    def _matrix(self, letter: str, diagonal: float = 0.0) -> Float[Array, "n n"]:
+        equations = self.layout.equations
+        entry = lambda i, j: self.coefficients.get(f"{letter}_{i}_{j}", self._value(f"{letter}_{j}_{i}"))
+        own = lambda i: self.coefficients.get(f"{letter}_{i}", jnp.asarray(diagonal))
+        return jnp.stack([jnp.stack([own(i) if i == j else entry(i, j) for j in equations]) for i in equations])

@@ -1,0 +1,118 @@
+"""Vehicle files in: TOML to a vehicle (formats.md)."""
+
+import dataclasses
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from ..effects import VOCABULARY, AbstractEffect, number_fields, options, parameter_table
+from ..errors import InputError
+from ..parameters import Parameter
+from .build import BODY_KEYS, VECTORS, build
+from .mechanism import Mechanism
+from .schema import Table, read_number, read_outputs, read_pairs
+from .submerged_body import SubmergedBody
+
+_TOP = ("schema", "name", "kind", "dof", "body", "coefficients", "inputs", "prescribed", "environment", "outputs", "effects")
+
+
+def read_vehicle(path: str | Path) -> SubmergedBody | Mechanism:
+    """The vehicle in the file at `path`.
+
+    **Raises** `InputError` that names the file and the key for anything that is not as formats.md has it.
+    """
+    path = Path(path)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read ({error.strerror})", "give the path of a vehicle file") from error
+    except UnicodeDecodeError as error:
+        raise InputError(str(path), "is not text", "give a vehicle file in TOML, encoded as UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(str(path), f"is not TOML: {error}", "mend it at that place") from error
+    return vehicle_from(data, str(path))
+
+
+def vehicle_from(data: dict[str, Any], where: str) -> SubmergedBody | Mechanism:
+    """The vehicle described by a parsed vehicle file; `where` names it in errors."""
+    top = Table(data, where, "")
+    top.only(_TOP)
+    if top.required("schema") != 1:
+        raise InputError(f"{where}: schema", f"is {data['schema']!r}", "this version reads schema = 1")
+    kind = top.choice("kind", ("submerged-body", "mechanism"))
+    body, extra = _read_body(top) if kind == "submerged-body" else ({}, {})
+    numbers = dict(body)
+    for name, entry in top.table("coefficients").items():
+        numbers[name] = read_number(name, entry, f"{where}: coefficients.{name}", free=True)
+    effects, effect_rows = _read_effects(data.get("effects", []), where)
+    return build(
+        where=where,
+        name=str(top.required("name")),
+        kind=kind,
+        dof=top.names("dof"),
+        numbers=numbers,
+        hull=extra,
+        inputs=read_pairs(top.table("inputs")),
+        prescribed=read_pairs(top.table("prescribed")),
+        environment=read_pairs(top.table("environment")),
+        outputs=read_outputs(top.table("outputs")),
+        effects=effects,
+        effect_rows=effect_rows,
+    )
+
+
+def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str, float]]:
+    """The numbers of `[body]`, vectors taken apart, and the hull's sizes."""
+    body = top.table("body")
+    body.only(BODY_KEYS)
+    numbers, hull = {}, {}
+    for key, entry in body.items():
+        place = f"{body.where}: body.{key}"
+        if key in VECTORS:
+            if not isinstance(entry, list) or len(entry) != 3:
+                raise InputError(place, "is not three numbers", f"give {key} = [ , , ]")
+            for name, item in zip(VECTORS[key], entry, strict=True):
+                numbers[name] = read_number(name, item, place, free=False)
+        elif key in ("length", "diameter", "reference_density"):
+            hull[key] = read_number(key, entry, place, free=False)[0]
+            if hull[key] <= 0.0:
+                raise InputError(place, f"is {hull[key]:g}", "give a positive number")
+        else:
+            numbers[key] = read_number(key, entry, place, free=False)
+    return numbers, hull
+
+
+def _read_effects(entries: Any, where: str) -> tuple[tuple[AbstractEffect, ...], tuple[Parameter, ...]]:
+    """The `[[effects]]` of a file."""
+    kinds = {kind.name: kind for kind in VOCABULARY}
+    effects, rows = [], []
+    if not isinstance(entries, list):
+        raise InputError(f"{where}: effects", "is not a list of tables", "write [[effects]] above each effect")
+    for number, entry in enumerate(entries, 1):
+        table = Table(entry, where, f"effects[{number}]")
+        kind = kinds[table.choice("effect", tuple(kinds))]
+        chosen = {f.rstrip("_"): f for f in _option_names(kind)}
+        table.only(("effect", "expression", "parameters", *chosen))
+        effect = kind(**{field: _tuple(table.required(key)) for key, field in chosen.items()})
+        table_rows = parameter_table(effect)
+        symbols = {symbol: field for field, symbol in effect.symbols().items()}
+        given = table.table("parameters")
+        given.only(tuple(symbols))
+        values = {}
+        for symbol, item in given.items():
+            old = table_rows[symbols[symbol]]
+            place = f"{where}: effects[{number}].parameters.{symbol}"
+            values[symbols[symbol]], row = read_number(old.name, item, place, free=True, lower=old.lower, unit=old.unit)
+            table_rows[symbols[symbol]] = row
+        effects.append(kind(**options(effect), **values))
+        rows += list(table_rows.values())
+    return tuple(effects), tuple(rows)
+
+
+def _option_names(kind: type[AbstractEffect]) -> list[str]:
+    numeric = {field.name for field in number_fields(kind)}
+    return [field.name for field in dataclasses.fields(kind) if field.name not in numeric]
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

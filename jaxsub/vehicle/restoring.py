@@ -1,0 +1,42 @@
+"""Weight and buoyancy."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..effects import GRAVITY
+
+STANDARD_DENSITY = 1025.0
+
+
+class Restoring(eqx.Module):
+    r"""$\tilde S(\eta)$ of a body with its origin at the centre of gravity (equations.md §1).
+
+    **Fields**
+
+    - `values`: `weight`, `buoyancy` N (at `reference_density`); `x_B y_B z_B` m from the centre of gravity.
+    - `reference_density`: kg/m³, the water in which `buoyancy` holds.
+    """
+
+    values: dict[str, Float[Array, ""]]
+    reference_density: float = eqx.field(static=True, default=STANDARD_DENSITY)
+
+    def buoyancy(self, environment: dict[str, Array]) -> Array:
+        r"""$B = B_0\,\rho/\rho_{ref} + \rho g V_{ballast}$ (N) for recorded `density` kg/m³ and `ballast` m³."""
+        density = environment.get("density", self.reference_density)
+        displaced = self.values["buoyancy"] * density / self.reference_density
+        return displaced + density * GRAVITY * environment["ballast"] if "ballast" in environment else displaced
+
+    def force(self, phi: Array, theta: Array, buoyancy: Array) -> dict[str, Array]:
+        """Generalised force by equation at the attitude `phi`, `theta` (rad) with the displaced weight `buoyancy` (N)."""
+        excess = self.values["weight"] - buoyancy
+        x, y, z = (self.values[name] * buoyancy for name in ("x_B", "y_B", "z_B"))
+        level, rolled, pitched = jnp.cos(phi) * jnp.cos(theta), jnp.sin(phi) * jnp.cos(theta), jnp.sin(theta)
+        return {
+            "surge": -excess * pitched,
+            "sway": excess * rolled,
+            "heave": excess * level,
+            "roll": -y * level + z * rolled,
+            "pitch": x * level + z * pitched,
+            "yaw": -x * rolled - y * pitched,
+        }

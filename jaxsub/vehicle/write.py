@@ -1,0 +1,100 @@
+"""Vehicle files out: a vehicle to TOML (formats.md)."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from ..effects import AbstractEffect, options, parameter_table
+from ..parameters import Parameter
+from .base import AbstractVehicle
+from .build import BODY_KEYS, VECTORS
+from .submerged_body import SubmergedBody
+
+
+def write_vehicle(vehicle: AbstractVehicle, path: str | Path, comment: str = "") -> None:
+    """Write `vehicle` so that `read_vehicle` gives it back, to the last digit."""
+    Path(path).write_text(vehicle_text(vehicle, comment), encoding="utf-8")
+
+
+def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
+    """The vehicle file of `vehicle` as text."""
+    layout, values = vehicle.layout, {name: float(v) for name, v in vehicle.values().items()}
+    rows = {row.name: row for row in layout.parameters}
+    document = tomlkit.document()
+    for line in comment.splitlines():
+        document.add(tomlkit.comment(line))
+    document.update({"schema": 1, "name": layout.name, "kind": layout.kind, "dof": list(layout.equations)})
+    own = {name: values[name] for name in vehicle.own_values()}
+    if isinstance(vehicle, SubmergedBody):
+        document["body"] = _body_table(vehicle, own, rows)
+    coefficients = tomlkit.table()
+    for name in own:
+        if not isinstance(vehicle, SubmergedBody) or name not in _body_names():
+            coefficients[name] = _number_table(own[name], rows.get(name), free=True)
+    document["coefficients"] = coefficients
+    for section, pairs in (
+        ("inputs", layout.inputs), ("prescribed", layout.prescribed), ("environment", layout.environment)
+    ):  # fmt: skip
+        if pairs:
+            document[section] = dict(pairs)
+    outputs = tomlkit.table()
+    for output in layout.outputs:
+        outputs[output.channel] = {"sigma": "estimate" if output.sigma is None else output.sigma}
+        if any(output.lever_arm):
+            outputs[output.channel]["lever_arm"] = list(output.lever_arm)
+    document["outputs"] = outputs
+    if vehicle.effects:
+        document["effects"] = tomlkit.aot()
+    for effect in vehicle.effects:
+        document["effects"].append(_effect_table(effect, rows))
+    return tomlkit.dumps(document)
+
+
+def _body_names() -> set[str]:
+    return {name for key in BODY_KEYS for name in VECTORS.get(key, (key,))}
+
+
+def _body_table(vehicle: SubmergedBody, values: dict[str, float], rows: dict[str, Parameter]) -> Any:
+    table = tomlkit.table()
+    for key in BODY_KEYS:
+        if key in VECTORS:
+            items = [_number_table(values[name], rows.get(name), free=False) for name in VECTORS[key]]
+            table[key] = items
+        elif key in values:
+            table[key] = _number_table(values[key], rows.get(key), free=False)
+    table["reference_density"] = vehicle.restoring.reference_density
+    table["length"], table["diameter"] = vehicle.layout.length, vehicle.layout.diameter
+    return table
+
+
+def _effect_table(effect: AbstractEffect, rows: dict[str, Parameter]) -> Any:
+    table = tomlkit.table()
+    table["effect"] = effect.name
+    for name, value in options(effect).items():
+        table[name.rstrip("_")] = list(value) if isinstance(value, tuple) else value
+    table["expression"] = effect.expression
+    symbols = effect.symbols()
+    table["parameters"] = {
+        symbols[field]: _number_table(float(getattr(effect, field)), rows.get(row.name), free=True)
+        for field, row in parameter_table(effect).items()
+    }
+    return table
+
+
+def _number_table(value: float, row: Parameter | None, *, free: bool) -> Any:
+    """A bare number where a body entry is plain, else an inline table; `free` is what the file takes for granted."""
+    row = row or Parameter("", free=False)
+    bounded, informed = np.isfinite([row.lower, row.upper]).any(), np.isfinite(row.prior_std)
+    if not free and not row.free:
+        return value
+    table = tomlkit.inline_table()
+    table["value"] = value
+    if row.free != free:
+        table["fixed"] = not row.free
+    if bounded:
+        table["bounds"] = [row.lower, row.upper]
+    if informed:
+        table["prior_std"] = row.prior_std
+    return table
