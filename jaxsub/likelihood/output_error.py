@@ -15,8 +15,13 @@ ANGLES = ("phi", "theta", "psi")
 
 
 def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
-    """Measured minus modelled outputs in SI, zero where nothing was measured; angles wrapped to (-π, π]."""
-    difference = runs.outputs - simulate(vehicle, runs, start)
+    """Measured minus modelled outputs in SI from the initial states `start`, zero where nothing was measured."""
+    return residual_outputs(vehicle, runs, simulate(vehicle, runs, start))
+
+
+def residual_outputs(vehicle: AbstractVehicle, runs: Runs, modelled: Float[Array, "r k c"]) -> Float[Array, "r k c"]:
+    """Measured minus `modelled`; angles wrapped to (-π, π], zero where nothing was measured."""
+    difference = runs.outputs - modelled
     turns = jnp.array([c in ANGLES and vehicle.layout.kind == "submerged-body" for c in vehicle.layout.channels])
     wrapped = jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
     return jnp.where(runs.mask, wrapped, 0.0)

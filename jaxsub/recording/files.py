@@ -1,7 +1,6 @@
 """Recordings as CSV, Parquet and NetCDF files whose headers are `name` (SI) or `name[unit]`."""
 
 import csv
-import math
 import os
 import re
 import tempfile
@@ -9,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pandas
 import xarray
@@ -33,7 +33,7 @@ def load(path: str | os.PathLike[str]) -> Recording:
         raise InputError(str(path), "is a folder" if path.is_dir() else "no such file", "give the path of a recording")
     columns = si_columns(str(path), read(path))
     if TIME not in columns:
-        similar = next((name for name in columns if "time" in name.lower()), None) or nearest(TIME, columns)
+        similar = next((name for name in columns if "time" in name.lower()), nearest(TIME, columns))
         remedy = f"rename {similar!r} to {TIME!r}" if similar else f"add a column headed {TIME}[s]"
         raise InputError(str(path), f"has no time column {TIME!r}", remedy)
     return Recording(path.stem, columns.pop(TIME), columns, str(path))
@@ -57,9 +57,9 @@ def save(recording: Recording, path: str | os.PathLike[str], units: Mapping[str,
 
 
 def _format(path: Path) -> tuple[Callable[[Path], Table], Callable[[Path, Samples], None]]:
-    if path.suffix.lower() not in _FORMATS:
-        raise InputError(str(path), f"unknown extension {path.suffix!r}", f"use {', '.join(_FORMATS)}")
-    return _FORMATS[path.suffix.lower()]
+    if found := _FORMATS.get(path.suffix.lower()):
+        return found
+    raise InputError(str(path), f"unknown extension {path.suffix!r}", f"use {', '.join(_FORMATS)}")
 
 
 @contextmanager
@@ -78,7 +78,7 @@ def _read_csv(path: Path) -> Table:
         rows.pop()
     if not rows:
         raise InputError(str(path), "is empty", "write a header and a row for each sample")
-    header, *body = rows
+    header, body = rows[0], rows[1:]
     for row, cells in enumerate(body, FIRST_ROW):
         if len(cells) != len(header):
             what = f"{len(cells)} cells under {len(header)} headers"
@@ -90,7 +90,7 @@ def _numbers(path: Path, header: str, cells: list[str]) -> np.ndarray:
     values = np.full(len(cells), np.nan)
     for index, cell in enumerate(cells):
         try:
-            values[index] = float(cell) if cell.strip() else math.nan
+            values[index] = float(cell.strip() or "nan")
         except ValueError as error:
             where = f"{path}, row {index + FIRST_ROW}, column {header!r}"
             raise InputError(where, f"{cell!r} is not a number", "write a number or leave the cell blank") from error
@@ -103,9 +103,9 @@ def _write_csv(path: Path, samples: Samples) -> None:
 
 def _read_parquet(path: Path) -> Table:
     with _reading(path, "Parquet"), parquet.ParquetFile(path) as file:
-        columns = file.read()
-        table = [(name, column.to_numpy()) for name, column in zip(columns.column_names, columns.columns, strict=True)]
-    return [(name, _numeric(path, name, values)) for name, values in table]
+        table = file.read()
+        columns = [column.to_numpy() for column in table.columns]
+    return [(name, _numeric(path, name, values)) for name, values in zip(table.column_names, columns, strict=True)]
 
 
 def _write_parquet(path: Path, samples: Samples) -> None:
@@ -113,12 +113,15 @@ def _write_parquet(path: Path, samples: Samples) -> None:
 
 
 def _read_netcdf(path: Path) -> Table:
+    # h5netcdf complains on stderr as well if it fails on this attribute, so look at it first.
+    with _reading(path, "NetCDF 4"), h5py.File(path) as file:
+        file.attrs.get("_nc3_strict")
     with _reading(path, "NetCDF 4"), xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
         variables = file.load().variables
     table = []
     for name, variable in variables.items():
-        unit = variable.attrs.get("units")
-        header = f"{name}[{unit}]" if unit is not None and "[" not in str(name) else str(name)
+        bare = "units" in variable.attrs and "[" not in str(name)
+        header = f"{name}[{variable.attrs['units']}]" if bare else str(name)
         table.append((header, _numeric(path, str(name), variable.to_numpy())))
     return table
 

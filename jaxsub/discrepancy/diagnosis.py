@@ -1,0 +1,194 @@
+"""What a diagnosis says: plain data that the report draws and `diagnosis.json` holds (formats.md)."""
+
+import dataclasses
+from typing import Any, Literal
+
+import numpy as np
+
+Verdict = Literal["none", "named", "ambiguous", "unknown"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Location:
+    """Where the model and the recordings differ.
+
+    `where` is an equation, `input:NAME` or `sensor:CHANNEL`; `share` of the mismatch that lies there; `times` (run,
+    start s, end s) of the intervals where it is significant; `grows_with` the variables it follows, closest first.
+    """
+
+    where: str
+    share: float
+    times: list[tuple[str, float, float]]
+    grows_with: list[str]
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """One number with its standard error and unit, all in SI."""
+
+    value: float
+    standard_error: float
+    unit: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Rival:
+    """Another explanation that was refitted: its effect, the form of it, and its probability."""
+
+    effect: str
+    label: str
+    probability: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Physics:
+    """An accepted effect. `probability` is that of its name, over all of its forms."""
+
+    effect: str
+    label: str
+    equations: list[str]
+    expression: str
+    probability: float
+    parameters: dict[str, Estimate]
+    rivals: list[Rival]
+
+
+@dataclasses.dataclass(frozen=True)
+class Candidate:
+    """One line of the score scan: how much of the residual a candidate would explain.
+
+    `statistic` is χ² with `degrees` of freedom under "nothing left out", `p_value` is corrected for all candidates
+    tried, `amplitudes` are the predicted sizes by symbol, `kept` the share of its trace that the coefficients cannot
+    absorb, `outcome` what became of it.
+    """
+
+    effect: str
+    label: str
+    statistic: float
+    degrees: int
+    p_value: float
+    amplitudes: dict[str, float]
+    kept: float
+    outcome: str
+
+
+@dataclasses.dataclass(frozen=True)
+class ForceTrace:
+    """The generalised force that one run asks for beyond the model, by equation, and its 1-σ band (N or N m)."""
+
+    run: str
+    times: np.ndarray
+    force: dict[str, np.ndarray]
+    band: dict[str, np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True)
+class Overlay:
+    """Measured and free-running modelled outputs of one run that the fit did not see, by channel, SI; NaN is missing."""
+
+    run: str
+    times: np.ndarray
+    measured: dict[str, np.ndarray]
+    baseline: dict[str, np.ndarray]
+    improved: dict[str, np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True)
+class Coefficient:
+    """One free number before and after; `verdict` is `identified`, `weak` (standard error above half its size), or
+    `not excited` (the recordings leave it open)."""
+
+    name: str
+    unit: str
+    start: float
+    baseline: Estimate | None
+    improved: Estimate | None
+    verdict: str
+
+
+@dataclasses.dataclass(frozen=True)
+class ChannelQuality:
+    """What the recordings are worth, channel by channel: `sigma` as stated or estimated, `record_sigma` the white part
+    of the recording itself, from its differences; both SI."""
+
+    channel: str
+    unit: str
+    samples: int
+    missing: float
+    sigma: float
+    sigma_estimated: bool
+    record_sigma: float
+
+
+@dataclasses.dataclass(frozen=True)
+class RunQuality:
+    """One run: its role (`train` or `held out`), length in s, samples and sample intervals in s."""
+
+    name: str
+    role: str
+    duration: float
+    samples: int
+    interval_median: float
+    interval_max: float
+
+
+@dataclasses.dataclass(frozen=True)
+class Diagnosis:
+    """The answer to "what physics was left out", with all that shows it.
+
+    `fit` maps `train` and `held_out` to `baseline` and `improved` to rms(residual)/σ by channel. `p_value` is that of
+    the whole mismatch, corrected for everything tried. `summary` is the verdict in one sentence, `notes` what a reader
+    must know besides.
+    """
+
+    verdict: Verdict
+    vehicle: str
+    summary: str
+    p_value: float
+    where: list[Location]
+    physics: list[Physics]
+    fit: dict[str, dict[str, dict[str, float]]]
+    candidates: list[Candidate]
+    forces: list[ForceTrace]
+    remaining_forces: list[ForceTrace]
+    overlays: list[Overlay]
+    coefficients: list[Coefficient]
+    channels: list[ChannelQuality]
+    runs: list[RunQuality]
+    notes: list[str]
+    next_manoeuvre: str | None
+
+    def to_json(self) -> dict[str, Any]:
+        """The contents of `diagnosis.json`."""
+        plain = lambda estimate: dataclasses.asdict(estimate)
+        where = [
+            {
+                "equation": place.where,
+                "share": place.share,
+                "times": [[start, end] for _, start, end in place.times],
+                "runs": [run for run, _, _ in place.times],
+                "grows_with": place.grows_with,
+            }
+            for place in self.where
+        ]
+        physics = [
+            {
+                "effect": found.effect,
+                "equations": found.equations,
+                "expression": found.expression,
+                "probability": found.probability,
+                "parameters": {symbol: plain(estimate) for symbol, estimate in found.parameters.items()},
+                "rivals": [{"effect": rival.effect, "probability": rival.probability} for rival in found.rivals],
+            }
+            for found in self.physics
+        ]
+        return {
+            "schema": 1,
+            "verdict": self.verdict,
+            "summary": self.summary,
+            "mismatch": {"p_value": self.p_value, "where": where},
+            "physics": physics,
+            "fit": self.fit,
+            "next_manoeuvre": self.next_manoeuvre,
+            "notes": self.notes,
+        }

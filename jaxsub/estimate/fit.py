@@ -1,0 +1,192 @@
+"""One `fit`, one `Fit`: maximum likelihood by Gauss–Newton with Levenberg–Marquardt damping."""
+
+import dataclasses
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from ..likelihood import Linearised, concentrated_sigma, linearise, residual_outputs
+from ..recording.runs import Runs
+from ..results import RESULTS
+from ..simulate import simulate
+from ..vehicle import AbstractVehicle
+from ..vehicle.inertia import indefinite
+from .problem import Problem
+
+_CONCENTRATIONS, _MAX_STEPS = 12, 60
+
+
+class Fit(eqx.Module):
+    """What an estimation found.
+
+    **Fields**
+
+    - `vehicle`: with the fitted numbers. `start`: (R, s) fitted initial states. `sigma`: (c,) noise, SI.
+    - `names`, `covariance`: of the p free parameters, physical units; the initial states' uncertainty is included.
+    - `model`: the vehicle linearised along the fitted trajectory.
+    - `cost`: ½ Σ whitened residuals², priors included. `gradient_norm`: largest |∂cost/∂y| in scaled coordinates,
+      relative to the largest curvature's square root: how many standard errors the optimum may still be away.
+    - `steps`: taken by the search. `result`: a `RESULTS` value.
+    """
+
+    vehicle: AbstractVehicle
+    runs: Runs
+    start: Float[Array, "r s"]
+    sigma: Float[Array, " c"]
+    covariance: Float[Array, "p p"]
+    model: Linearised
+    cost: Float[Array, ""]
+    gradient_norm: Float[Array, ""]
+    steps: Array
+    result: optx.RESULTS
+    names: tuple[str, ...] = eqx.field(static=True)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted free parameters by name."""
+        values = self.vehicle.values()
+        return {name: float(values[name]) for name in self.names}
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Their standard errors."""
+        return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
+
+    @property
+    def residual(self) -> Float[Array, "r k c"]:
+        """Whitened residuals."""
+        return self.model.error / self.sigma
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """rms(residual)/σ of each channel: 1 is the noise floor."""
+        return channel_rms(self.residual, self.runs, self.vehicle.layout.channels)
+
+
+def channel_rms(residual: Array, runs: Runs, channels: tuple[str, ...]) -> dict[str, float]:
+    """rms of whitened residuals by channel, over what was measured."""
+    mean_square = jnp.sum(residual**2, (0, 1)) / jnp.maximum(runs.samples(), 1.0)
+    return dict(zip(channels, np.sqrt(np.asarray(mean_square)).tolist(), strict=True))
+
+
+@eqx.filter_jit
+def _search(problem: Problem, y: Array) -> tuple[Array, Array, Array, optx.RESULTS]:
+    """Coordinates of the optimum from the start `y`, its cost, the steps taken and what became of it."""
+    solution = optx.least_squares(
+        lambda y, problem: problem.residuals(y),
+        optx.LevenbergMarquardt(rtol=1e-4, atol=1e-5),
+        y,
+        args=problem,
+        options={"jac": "fwd"},
+        max_steps=_MAX_STEPS,
+        throw=False,
+    )
+    cost = 0.5 * jnp.sum(solution.state.f_info.residual**2)
+    # a step into NaN is refused by the trust region, so only a start that does not run leaves a NaN behind
+    result = RESULTS.where(jnp.isfinite(cost), RESULTS.promote(solution.result), RESULTS.nan_start)
+    return solution.value, cost, solution.stats["num_steps"], result
+
+
+def search(
+    vehicle: AbstractVehicle, runs: Runs, *, sigma: Array | None = None, start: Array | None = None
+) -> tuple[AbstractVehicle, Array, Array, Array, Array, optx.RESULTS]:
+    """The maximum-likelihood vehicle, initial states, noise, cost, steps and result, without any statistics.
+
+    Noise comes from `sigma`, else from the vehicle file; channels whose noise is to be estimated have it concentrated
+    out: fit, take the rms, fit again from there, until it settles.
+    """
+    given = [output.sigma for output in vehicle.layout.outputs]
+    estimated = jnp.array([s is None and sigma is None for s in given])
+    noise = jnp.asarray(sigma) if sigma is not None else jnp.where(estimated, _signal(runs), jnp.array([s or 1.0 for s in given]))
+    problem = Problem.of(vehicle, runs, noise, start)
+    y, total = problem.coordinates(), jnp.asarray(0)
+    for _ in range(_CONCENTRATIONS):
+        y, cost, steps, result = _search(problem, y)
+        total = total + steps
+        fitted, states = problem.split(y)
+        if not bool(estimated.any()) or not bool(jnp.isfinite(cost)):
+            break
+        rms = concentrated_sigma(_errors(fitted, runs, states), runs)
+        settled = bool(jnp.all(jnp.abs(rms / problem.sigma - 1.0) < 0.003, where=estimated))
+        problem = dataclasses.replace(problem, sigma=jnp.where(estimated, rms, problem.sigma))
+        if settled:
+            break
+    return fitted, states, problem.sigma, cost, total, result
+
+
+_errors = eqx.filter_jit(lambda vehicle, runs, start: residual_outputs(vehicle, runs, simulate(vehicle, runs, start)))
+
+
+def _signal(runs: Runs) -> Array:
+    """The standard deviation of each measured channel: where the search for its noise starts."""
+    count = jnp.maximum(runs.samples(), 1.0)
+    mean = jnp.sum(runs.outputs, (0, 1)) / count
+    spread = jnp.sqrt(jnp.sum(jnp.where(runs.mask, runs.outputs - mean, 0.0) ** 2, (0, 1)) / count)
+    return jnp.where(spread > 0.0, spread, 1.0)
+
+
+def fit(vehicle: AbstractVehicle, runs: Runs, *, sigma: Array | None = None, start: Array | None = None) -> Fit:
+    """Fit the free numbers of `vehicle`, and an initial state for each run, to `runs`.
+
+    `sigma` overrides the file's noise; `start` is where the initial states' search begins. A failure is a value in
+    `Fit.result`, never an exception.
+    """
+    fitted, states, noise, cost, steps, result = search(vehicle, runs, sigma=sigma, start=start)
+    return evaluate(fitted, runs, states, noise, cost=cost, steps=steps, result=result)
+
+
+def evaluate(
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    start: Array,
+    sigma: Array,
+    *,
+    cost: Array,
+    steps: Array,
+    result: optx.RESULTS,
+) -> Fit:
+    """The `Fit` of a vehicle that a search has already found."""
+    model = linearise(vehicle, runs, start)
+    names = tuple(row.name for row in vehicle.layout.free)
+    covariance, gradient = _statistics(Problem.of(vehicle, runs, sigma), model)
+    inertia = np.asarray(vehicle.mass_matrix())
+    if not np.all(np.isfinite(inertia)) or indefinite(inertia, vehicle.layout.equations, []):
+        result = RESULTS.indefinite_inertia
+    elif bool(result == RESULTS.successful) and not float(gradient) < 0.1:
+        result = RESULTS.not_stationary
+    return Fit(vehicle, runs, start, sigma, covariance, model, cost, gradient, steps, result, names)
+
+
+@eqx.filter_jit
+def _statistics(problem: Problem, model: Linearised) -> tuple[Array, Array]:
+    """Covariance of the free parameters, and the gradient in standard errors."""
+    information, gradient = information_matrix(problem, model)
+    size = jnp.sqrt(jnp.maximum(jnp.diag(information), 1e-300))
+    # a pseudo-inverse in equilibrated coordinates: a direction without information gets no false certainty elsewhere
+    values, vectors = jnp.linalg.eigh(information / jnp.outer(size, size))
+    inverse = (vectors / jnp.maximum(values, 1e-14)) @ vectors.T
+    covariance = inverse / jnp.outer(size, size)
+    step = (covariance @ gradient) / jnp.sqrt(jnp.maximum(jnp.diag(covariance), 1e-300))
+    return covariance, jnp.max(jnp.abs(step), initial=0.0)
+
+
+def information_matrix(problem: Problem, model: Linearised) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:
+    r"""Fisher information of the free parameters (physical units) with the initial states eliminated, and the gradient.
+
+    $I = \sum_r J_\theta^T J_\theta - J_\theta^T J_x (J_x^T J_x + S^{-2})^{-1} J_x^T J_\theta$ plus the prior's.
+    """
+    weight = problem.runs.mask / problem.sigma
+    theta, start = model.theta * weight[..., None], model.start * weight[..., None]
+    residual = model.error / problem.sigma
+    cross = lambda a, b: jnp.einsum("rkcp,rkcq->rpq", a, b)
+    own = cross(start, start) + jnp.diag(problem.spread**-2.0)
+    mixed = cross(theta, start)
+    gain = jnp.linalg.solve(own, jnp.swapaxes(mixed, 1, 2))
+    information = jnp.sum(cross(theta, theta) - mixed @ gain, 0) + jnp.diag(problem.prior_std**-2.0)
+    values = problem.vehicle.values()
+    at = [values[row.name] for row in problem.vehicle.layout.free]
+    pull = (jnp.stack(at) - problem.prior_mean) / problem.prior_std**2 if at else jnp.zeros(0)
+    return information, jnp.einsum("rkcp,rkc->p", theta, residual) - pull

@@ -1,0 +1,108 @@
+r"""The model linearised along its trajectory, and the one recursion through which every question is asked.
+
+A coefficient, an initial state, a candidate effect and an unknown force differ only in how they force
+$D_{k+1} = A_k D_k + f_k$, so all of them go through it as columns of one batch. The Jacobians are exact derivatives of the
+sampled step; nothing here depends on how many effects the vocabulary has.
+"""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..recording.runs import Runs
+from ..simulate import Sampled
+from ..vehicle import AbstractVehicle
+from .output_error import residual_outputs
+
+
+class Linearised(eqx.Module):
+    """A model along its trajectory through R runs of K samples, s states, c channels, n equations, p free parameters.
+
+    **Fields**
+
+    - `states`: (R, K, s). `error`: (R, K, c) measured minus modelled, SI, zero where missing.
+    - `A`: (R, K-1, s, s) of the step by the state. `G`: (R, K-1, s, 2n) by a force at its start and end.
+    - `C`: (R, K, c, s) of the outputs by the state.
+    - `theta`: (R, K, c, p) of the outputs by the free parameters; `start`: (R, K, c, s) by the run's initial state.
+    """
+
+    states: Float[Array, "r k s"]
+    error: Float[Array, "r k c"]
+    A: Float[Array, "r k1 s s"]
+    G: Float[Array, "r k1 s n2"]
+    C: Float[Array, "r k c s"]
+    theta: Float[Array, "r k c p"]
+    start: Float[Array, "r k c s"]
+
+
+def propagate(
+    A: Float[Array, "r k1 s s"], forcing: Float[Array, "r k1 s q"], start: Float[Array, "r s q"]
+) -> Float[Array, "r k s q"]:
+    """Solve D ← A D + forcing from `start`, q columns of R runs at once."""
+
+    def advance(D: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
+        a, f = step
+        D = a @ D + f
+        return D, D
+
+    swap = lambda leaf: jnp.swapaxes(leaf, 0, 1)
+    following = jax.lax.scan(advance, start, (swap(A), swap(forcing)))[1]
+    return jnp.concatenate([start[:, None], swap(following)], axis=1)
+
+
+@eqx.filter_jit
+def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
+    """`vehicle` along its trajectory from the initial states `start`."""
+    names = [row.name for row in vehicle.layout.free]
+    values = vehicle.values()
+    theta = jnp.stack([values[name] for name in names]) if names else jnp.zeros(0)
+    with_theta = lambda vector: vehicle.with_values(dict(zip(names, vector, strict=True)))
+    sampled = Sampled.of(vehicle, runs)
+    states = sampled.states(runs, start)
+    r, k, s = states.shape
+    n = sampled.inverse.shape[0]
+    before = states[:, :-1].reshape(r * (k - 1), s)
+    index, live = runs.step_of.reshape(-1), runs.live.reshape(-1)[:, None, None]
+
+    def steps(model: Sampled, at: Array, push: Array) -> Array:
+        nodes = jax.vmap(model.vehicle.actuate)(runs.times, runs.nodes())
+        return jax.vmap(model.step)(at, nodes.reshape(-1, *nodes.shape[2:]), index, push)
+
+    def stepped(change: Array) -> Array:
+        parameters, moved, push = jnp.split(change, [len(names), len(names) + s])
+        pushed = jnp.broadcast_to(push.reshape(2, n), (len(before), 2, n))
+        return steps(Sampled.of(with_theta(theta + parameters), runs), before + moved, pushed)
+
+    def shown(change: Array) -> Array:
+        parameters, moved = jnp.split(change, [len(names)])
+        return with_theta(theta + parameters).measure(runs.times, states + moved, runs.signals)
+
+    p = len(names)
+    F, A, G = jnp.split(_columns(stepped, jnp.zeros(p + s + 2 * n)), [p, p + s], axis=-1)
+    A = jnp.where(live, A, jnp.eye(s)).reshape(r, k - 1, s, s)
+    G, F = (jnp.where(live, M, 0.0).reshape(r, k - 1, s, M.shape[-1]) for M in (G, F))
+    direct, C = jnp.split(_columns(shown, jnp.zeros(p + s)), [p], axis=-1)
+    forcing = jnp.concatenate([F, jnp.zeros((r, k - 1, s, s))], axis=-1)
+    origin = jnp.broadcast_to(jnp.concatenate([jnp.zeros((s, p)), jnp.eye(s)], 1), (r, s, p + s))
+    D = propagate(A, forcing, origin)
+    sensitivity = C @ D
+    error = residual_outputs(vehicle, runs, vehicle.measure(runs.times, states, runs.signals))
+    return Linearised(states, error, A, G, C, sensitivity[..., :p] + direct, sensitivity[..., p:])
+
+
+@eqx.filter_jit
+def force_columns(
+    model: Linearised, start_force: Float[Array, "r k1 n q"], end_force: Float[Array, "r k1 n q"]
+) -> Float[Array, "r k c q"]:
+    """What q extra generalised forces, given at the start and end of each interval (N, N m), do to the outputs."""
+    forcing = model.G @ jnp.concatenate([start_force, end_force], axis=2)
+    r, s, q = forcing.shape[0], forcing.shape[2], forcing.shape[3]
+    return model.C @ propagate(model.A, forcing, jnp.zeros((r, s, q)))
+
+
+def _columns(f: Callable[[Array], Array], at: Float[Array, " q"]) -> Array:
+    """The Jacobian of `f` at `at`, its columns last: forward mode, all columns in one batch."""
+    return jax.vmap(lambda tangent: jax.jvp(f, (at,), (tangent,))[1], out_axes=-1)(jnp.eye(at.size, dtype=at.dtype))

@@ -1,0 +1,89 @@
+"""A Parquet or NetCDF recording loads to SI by header or attribute, and what is no column of numbers is refused."""
+
+import gc
+import sys
+
+import h5py
+import numpy as np
+import pandas
+import pytest
+import xarray
+
+from jaxsub.errors import InputError
+from jaxsub.recording import load
+
+
+def refusal(path):
+    with pytest.raises(InputError) as caught:
+        load(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert len(message.splitlines()) == 1
+    return message.removeprefix(str(path))
+
+
+def test_parquet_takes_integers_flags_and_nulls(tmp_path):
+    frame = pandas.DataFrame({"t[ms]": [0, 1000], "n": pandas.array([None, 2], "Int64"), "on": [True, False]})
+    frame.to_parquet(tmp_path / "run.parquet")
+    run = load(tmp_path / "run.parquet")
+    assert np.array_equal(run.times, [0.0, 1.0])
+    np.testing.assert_array_equal(run.column("n"), [np.nan, 2.0])
+    assert np.array_equal(run.column("on"), [1.0, 0.0])
+
+
+@pytest.mark.parametrize("column", [["a", "b"], pandas.to_datetime(["2020-01-01", "2020-01-02"]), [[1.0], [2.0]]])
+def test_parquet_column_that_is_not_numbers_is_refused(tmp_path, column):
+    path = tmp_path / "run.parquet"
+    pandas.DataFrame({"t": [0.0, 1.0], "label": column}).to_parquet(path)
+    assert refusal(path).startswith(", column 'label': holds ")
+
+
+def test_netcdf_unit_is_an_attribute_and_its_time_counts_from_anywhere(tmp_path):
+    path = tmp_path / "run.nc"
+    variables = {"r": ("t", [180.0, np.nan], {"units": "deg s-1"}), "z[cm]": ("t", [100.0, 200.0])}
+    coordinate = {"t": ("t", [0.0, 30.0], {"units": "minutes since 2020-01-01 00:00"})}
+    xarray.Dataset(variables, coordinate).to_netcdf(path, engine="h5netcdf")
+    run = load(path)
+    assert np.array_equal(run.times, [0.0, 1800.0])
+    np.testing.assert_allclose(run.column("r"), [np.pi, np.nan])
+    np.testing.assert_allclose(run.column("z"), [1.0, 2.0])
+
+
+def test_netcdf_time_may_be_a_variable_on_another_dimension(tmp_path):
+    path = tmp_path / "run.nc"
+    xarray.Dataset({"t": ("obs", [0.0, 1.0]), "u": ("obs", [3, 4])}).to_netcdf(path, engine="h5netcdf")
+    assert np.array_equal(load(path).column("u"), [3.0, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("variable", "message"),
+    [
+        (("t", ["a", "b"]), ", column 'x': holds 1-dimensional"),
+        (((), 1.0), ", column 'x': holds 0-dimensional float64 data; "),
+        (("other", [1.0, 2.0, 3.0]), ", column 'x': has shape (3,) beside 2 times; "),
+        (("t", [1.0, 2.0], {"units": "knts"}), ", header 'x[knts]': unknown unit 'knts'; "),
+    ],
+)
+def test_netcdf_variable_that_is_no_column_is_refused(tmp_path, variable, message):
+    path = tmp_path / "run.nc"
+    xarray.Dataset({"x": variable}, {"t": [0.0, 1.0]}).to_netcdf(path, engine="h5netcdf")
+    assert refusal(path).startswith(message)
+
+
+def test_hdf5_that_is_not_netcdf_loads_or_is_refused(tmp_path):
+    path = tmp_path / "run.nc"
+    with h5py.File(path, "w") as file:
+        file["group/t"] = [0.0, 1.0]
+    assert "no time column" in refusal(path)
+
+
+def test_damaged_netcdf_is_refused_without_a_complaint_on_stderr(tmp_path, capsys, monkeypatch):
+    path = tmp_path / "run.nc"
+    xarray.Dataset({}, {"t": [0.0, 1.0]}).to_netcdf(path, engine="h5netcdf")
+    path.write_bytes(path.read_bytes().replace(b"OHDR", b"ohdr"))
+    complaints = []
+    monkeypatch.setattr(sys, "unraisablehook", complaints.append)
+    assert refusal(path).startswith(": cannot be read (")
+    gc.collect()
+    assert not complaints
+    assert capsys.readouterr() == ("", "")
