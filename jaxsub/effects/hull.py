@@ -14,6 +14,14 @@ from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion
 WATER_DENSITY = 1025.0
 
 
+def _per(equation: str, *variables: str) -> str:
+    """The unit of a coefficient that makes a force of `equation` from a product of variables."""
+    lines, angles = EQUATIONS[:3], EQUATIONS[3:]
+    force = "N" if equation in lines else "N*m"
+    units = ["(m/s)" if v in lines else "(rad/s)" if v in angles else "rad" for v in variables]
+    return "/".join([force, *units]) if equation in EQUATIONS else "1"
+
+
 class _PowerDamping(AbstractForce):
     """Drag on one equation that grows with a power of its own velocity."""
 

@@ -8,10 +8,9 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from ..likelihood import Linearised, concentrated_sigma, linearise, residual_outputs
+from ..likelihood import Linearised, concentrated_sigma, errors, linearise
 from ..recording.runs import Runs
 from ..results import RESULTS
-from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 from ..vehicle.inertia import indefinite
 from .problem import Problem
@@ -41,7 +40,7 @@ class Fit(eqx.Module):
     cost: Float[Array, ""]
     gradient_norm: Float[Array, ""]
     steps: Array
-    result: optx.RESULTS
+    result: RESULTS
     names: tuple[str, ...] = eqx.field(static=True)
 
     @property
@@ -54,6 +53,11 @@ class Fit(eqx.Module):
     def standard_errors(self) -> dict[str, float]:
         """Their standard errors."""
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
+
+    @property
+    def problem(self) -> Problem:
+        """The least-squares problem at whose optimum this is."""
+        return Problem.of(self.vehicle, self.runs, self.sigma)
 
     @property
     def residual(self) -> Float[Array, "r k c"]:
@@ -73,7 +77,7 @@ def channel_rms(residual: Array, runs: Runs, channels: tuple[str, ...]) -> dict[
 
 
 @eqx.filter_jit
-def _search(problem: Problem, y: Array) -> tuple[Array, Array, Array, optx.RESULTS]:
+def _search(problem: Problem, y: Array) -> tuple[Array, Array, Array, RESULTS]:
     """Coordinates of the optimum from the start `y`, its cost, the steps taken and what became of it."""
     solution = optx.least_squares(
         lambda y, problem: problem.residuals(y),
@@ -91,17 +95,23 @@ def _search(problem: Problem, y: Array) -> tuple[Array, Array, Array, optx.RESUL
 
 
 def search(
-    vehicle: AbstractVehicle, runs: Runs, *, sigma: Array | None = None, start: Array | None = None
-) -> tuple[AbstractVehicle, Array, Array, Array, Array, optx.RESULTS]:
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    *,
+    sigma: Array | None = None,
+    start: Array | None = None,
+    moving: bool = True,
+) -> tuple[AbstractVehicle, Array, Array, Array, Array, RESULTS]:
     """The maximum-likelihood vehicle, initial states, noise, cost, steps and result, without any statistics.
 
+    `moving` false keeps the vehicle and finds the initial states alone, as a run that the fit did not see asks for.
     Noise comes from `sigma`, else from the vehicle file; channels whose noise is to be estimated have it concentrated
     out: fit, take the rms, fit again from there, until it settles.
     """
     given = [output.sigma for output in vehicle.layout.outputs]
     estimated = jnp.array([s is None and sigma is None for s in given])
     noise = jnp.asarray(sigma) if sigma is not None else jnp.where(estimated, _signal(runs), jnp.array([s or 1.0 for s in given]))
-    problem = Problem.of(vehicle, runs, noise, start)
+    problem = Problem.of(vehicle, runs, noise, start, moving=moving)
     y, total = problem.coordinates(), jnp.asarray(0)
     for _ in range(_CONCENTRATIONS):
         y, cost, steps, result = _search(problem, y)
@@ -109,7 +119,7 @@ def search(
         fitted, states = problem.split(y)
         if not bool(estimated.any()) or not bool(jnp.isfinite(cost)):
             break
-        rms = concentrated_sigma(_errors(fitted, runs, states), runs)
+        rms = concentrated_sigma(output_errors(fitted, runs, states), runs)
         settled = bool(jnp.all(jnp.abs(rms / problem.sigma - 1.0) < 0.003, where=estimated))
         problem = dataclasses.replace(problem, sigma=jnp.where(estimated, rms, problem.sigma))
         if settled:
@@ -117,7 +127,10 @@ def search(
     return fitted, states, problem.sigma, cost, total, result
 
 
-_errors = eqx.filter_jit(lambda vehicle, runs, start: residual_outputs(vehicle, runs, simulate(vehicle, runs, start)))
+@eqx.filter_jit
+def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Array) -> Float[Array, "r k c"]:
+    """`likelihood.errors`, compiled: measured minus modelled outputs in SI."""
+    return errors(vehicle, runs, start)
 
 
 def _signal(runs: Runs) -> Array:
@@ -146,7 +159,7 @@ def evaluate(
     *,
     cost: Array,
     steps: Array,
-    result: optx.RESULTS,
+    result: RESULTS,
 ) -> Fit:
     """The `Fit` of a vehicle that a search has already found."""
     model = linearise(vehicle, runs, start)

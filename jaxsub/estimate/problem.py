@@ -4,7 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..effects import CHANNEL_UNITS, VELOCITIES
 from ..likelihood import errors
@@ -23,7 +23,8 @@ class Problem(eqx.Module):
 
     - `vehicle`: its free numbers are where the search starts. `runs`: the recordings.
     - `sigma`: (c,) noise of each channel, SI.
-    - `transform`: of the free parameters. `prior_mean`, `prior_std`: (p,), the latter infinite where there is none.
+    - `transform`: of the free parameters; `origin`: (p,) the coordinates where they start, and stay where `moving` is
+      false. `prior_mean`, `prior_std`: (p,), the latter infinite where there is none.
     - `guess`, `spread`: (R, s) and (s,) Gaussian prior of the initial states.
     """
 
@@ -31,14 +32,22 @@ class Problem(eqx.Module):
     runs: Runs
     sigma: Float[Array, " c"]
     transform: Transform
+    origin: Float[Array, " p"]
+    moving: Bool[Array, ""]
     prior_mean: Float[Array, " p"]
     prior_std: Float[Array, " p"]
     guess: Float[Array, "r s"]
     spread: Float[Array, " s"]
 
     @classmethod
-    def of(cls, vehicle: AbstractVehicle, runs: Runs, sigma: Array, start: Array | None = None) -> "Problem":
-        """The problem of fitting `vehicle` to `runs`; the search starts from the initial states `start`, if given."""
+    def of(
+        cls, vehicle: AbstractVehicle, runs: Runs, sigma: Array, start: Array | None = None, *, moving: bool = True
+    ) -> "Problem":
+        """The problem of fitting `vehicle` to `runs`; the search starts from the initial states `start`, if given.
+
+        `moving` false keeps the parameters and frees the initial states alone. It is data and not structure, so the
+        same compiled search serves both.
+        """
         rows = vehicle.layout.free
         values = vehicle.values()
         theta = np.array([float(values[row.name]) for row in rows])
@@ -46,11 +55,14 @@ class Problem(eqx.Module):
         # an effect starts at its fitted or predicted size, which is no prior knowledge
         means = [row.prior_mean if row.name in own else float(values[row.name]) for row in rows]
         guess, spread = initial_guess(vehicle, runs)
+        transform = Transform.of(rows, theta)
         return cls(
             vehicle,
             runs,
             jnp.asarray(sigma),
-            Transform.of(rows, theta),
+            transform,
+            transform.to_free(jnp.asarray(theta)),
+            jnp.asarray(moving),
             jnp.asarray(means),
             jnp.asarray([row.prior_std for row in rows]),
             guess if start is None else start,
@@ -61,16 +73,13 @@ class Problem(eqx.Module):
         """The vehicle and the initial states that the coordinates `y` stand for."""
         p = len(self.prior_mean)
         names = [row.name for row in self.vehicle.layout.free]
-        theta = self.transform.to_physical(y[:p])
+        theta = self.transform.to_physical(jnp.where(self.moving, y[:p], self.origin))
         vehicle = self.vehicle.with_values(dict(zip(names, theta, strict=True)))
         return vehicle, self.guess + self.spread * y[p:].reshape(self.guess.shape)
 
     def coordinates(self) -> Float[Array, " d"]:
         """The coordinates of the start."""
-        values = self.vehicle.values()
-        theta = [values[row.name] for row in self.vehicle.layout.free]
-        free = self.transform.to_free(jnp.stack(theta)) if theta else jnp.zeros(0)
-        return jnp.concatenate([free, jnp.zeros(self.guess.size)])
+        return jnp.concatenate([self.origin, jnp.zeros(self.guess.size)])
 
     def residuals(self, y: Float[Array, " d"]) -> Float[Array, " m"]:
         """Whitened errors of the outputs, then of the priors."""
@@ -119,7 +128,7 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
     names = [VELOCITIES.get(e, f"{e}_rate") for e in layout.equations] + list(layout.positions)
     aliases = {"z": ("z", "depth")}
     mask, outputs = np.asarray(runs.mask), np.asarray(runs.outputs)
-    guess = np.zeros((len(runs.names), len(names)))
+    guess = np.zeros((runs.times.shape[0], len(names)))
     spread = np.ones(len(names))
     for i, name in enumerate(names):
         spread[i] = _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)

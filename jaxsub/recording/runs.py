@@ -1,5 +1,6 @@
 """Several recordings as one batch of arrays that simulation and likelihood take."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import equinox as eqx
@@ -20,7 +21,7 @@ class Runs(eqx.Module):
     - `live`: (R, K-1) false where padded.
     - `signals`: (R, K, m) input columns; `held`: for each, whether it is held between samples or interpolated.
     - `outputs`: (R, K, c) measured channels, zero where missing; `mask`: (R, K, c) true where measured.
-    - `names`: of the runs. `substeps`: integration steps in each sample interval.
+    - `substeps`: integration steps in each sample interval.
     """
 
     times: Float[Array, "r k"]
@@ -31,7 +32,6 @@ class Runs(eqx.Module):
     outputs: Float[Array, "r k c"]
     mask: Bool[Array, "r k c"]
     held: tuple[bool, ...] = eqx.field(static=True)
-    names: tuple[str, ...] = eqx.field(static=True)
     substeps: int = eqx.field(static=True, default=1)
 
     def nodes(self) -> Float[Array, "r k1 3 m"]:
@@ -40,9 +40,21 @@ class Runs(eqx.Module):
         end = jnp.where(jnp.array(self.held, bool), start, after)
         return jnp.stack([start, 0.5 * (start + end), end], axis=2)
 
-    def samples(self) -> Float[Array, " c"]:
+    def samples(self) -> Int[Array, " c"]:
         """Measured samples of each channel."""
         return jnp.sum(self.mask, axis=(0, 1))
+
+    def take(self, chosen: Sequence[int], size: int) -> "Runs":
+        """The runs numbered `chosen`, filled up to `size` with copies that count for nothing.
+
+        Every batch that one call of a program makes then has one shape, and is compiled for once.
+        """
+        index = np.array([*chosen, *[chosen[0]] * (size - len(chosen))])
+        real = jnp.arange(size)[:, None, None] < len(chosen)
+        arrays = ("times", "step_of", "live", "signals", "outputs", "mask")
+        taken = {name: getattr(self, name)[index] for name in arrays}
+        taken["mask"] = taken["mask"] & real
+        return dataclasses.replace(self, **taken)
 
 
 def stack_runs(
@@ -83,7 +95,6 @@ def stack_runs(
         jnp.asarray(np.where(np.isnan(z), 0.0, z)),
         jnp.asarray(~np.isnan(z)),
         (True,) * len(held) + (False,) * len(interpolated),
-        tuple(r.name for r in recordings),
         substeps,
     )
 

@@ -1,6 +1,23 @@
 """Simulation: the sampled step, the continuous reference, and synthetic recordings."""
 
+from .continuous import integrate
 from .exponential import phi_functions, step_table
+from .manoeuvres import doublet, prbs, square, three_two_one_one
 from .sampled import Sampled, measure, simulate
+from .synthetic import at_rest, sampled_states, synthetic
 
-__all__ = ["Sampled", "measure", "phi_functions", "simulate", "step_table"]
+__all__ = [
+    "Sampled",
+    "at_rest",
+    "doublet",
+    "integrate",
+    "measure",
+    "phi_functions",
+    "prbs",
+    "sampled_states",
+    "simulate",
+    "square",
+    "step_table",
+    "synthetic",
+    "three_two_one_one",
+]

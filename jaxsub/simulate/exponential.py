@@ -38,7 +38,7 @@ def phi_functions(A: Float[Array, "n n"]) -> tuple[Array, Array, Array, Array]:
 
 
 class StepTable(eqx.Module):
-    """Weights of the scheme for S step lengths h (s): matrices for the velocities, where L acts.
+    """Weights of the scheme for S step lengths h (s), or for one: matrices for the velocities, where L acts.
 
     **Fields**
 
@@ -46,13 +46,13 @@ class StepTable(eqx.Module):
     - `first`, `middle`, `last`: weights of N at the start, at each of the two middle stages, and at the end.
     """
 
-    h: Float[Array, " s"]
-    full: Float[Array, "s n n"]
-    half: Float[Array, "s n n"]
-    stage: Float[Array, "s n n"]
-    first: Float[Array, "s n n"]
-    middle: Float[Array, "s n n"]
-    last: Float[Array, "s n n"]
+    h: Float[Array, " *s"]
+    full: Float[Array, "*s n n"]
+    half: Float[Array, "*s n n"]
+    stage: Float[Array, "*s n n"]
+    first: Float[Array, "*s n n"]
+    middle: Float[Array, "*s n n"]
+    last: Float[Array, "*s n n"]
 
     def at(self, index: Array) -> "StepTable":
         """The weights of one step length."""

@@ -3,7 +3,6 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from ..recording.runs import Runs
@@ -74,13 +73,16 @@ class Sampled(eqx.Module):
         return jax.vmap(run)(start, nodes, runs.step_of, runs.live)
 
 
+def parabola(s: Float[Array, " *k"]) -> Float[Array, "*k 3"]:
+    """Weights of the signals at the start, middle and end of an interval at the fraction `s` of it."""
+    return jnp.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], axis=-1)
+
+
 def _subdivide(nodes: Array, parts: int) -> list[Array]:
     """Nodes of `parts` equal pieces of the interval, on the parabola through the three given."""
     if parts == 1:
         return [nodes]
-    s = np.arange(2 * parts + 1) / (2.0 * parts)
-    weights = np.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], axis=1)
-    fine = jnp.asarray(weights, nodes.dtype) @ nodes
+    fine = parabola(jnp.arange(2 * parts + 1, dtype=nodes.dtype) / (2.0 * parts)) @ nodes
     return [fine[2 * i : 2 * i + 3] for i in range(parts)]
 
 
