@@ -104,10 +104,10 @@ def unit_forces(vehicle: AbstractVehicle, path: Trajectory, fit: Fit, effect: Ab
     assert isinstance(effect, AbstractForce)
     names = amplitudes(effect)
     units = [with_numbers(effect, {name: float(name == own) for name in names}) for own in names]
-    return [np.stack([_stacked(vehicle, unit, motion) for motion in (path.start, path.end)]) for unit in units]
+    return [np.stack([stacked_force(vehicle, unit, motion) for motion in (path.start, path.end)]) for unit in units]
 
 
-def _stacked(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motion) -> np.ndarray:
+def stacked_force(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motion) -> np.ndarray:
     """The effect's force on the free equations along a motion."""
     plain = jax.tree.map(np.asarray, effect)
     parts = plain.force(motion)

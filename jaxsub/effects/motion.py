@@ -4,10 +4,10 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 EQUATIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-VELOCITIES = dict(zip(EQUATIONS, "uvwpqr", strict=True))
-FORCES = dict(zip(EQUATIONS, "XYZKMN", strict=True))
+VELOCITIES: dict[str, str] = dict(zip(EQUATIONS, "uvwpqr", strict=True))
+FORCES: dict[str, str] = dict(zip(EQUATIONS, "XYZKMN", strict=True))
 GRAVITY = 9.80665
-CHANNEL_UNITS = (
+CHANNEL_UNITS: dict[str, str] = (
     dict.fromkeys(("u", "v", "w", "speed", "depth_rate"), "m/s")
     | dict.fromkeys(("p", "q", "r", "heading_rate"), "rad/s")
     | dict.fromkeys(("phi", "theta", "psi"), "rad")

@@ -1,5 +1,7 @@
 """The continuous model between the samples of recordings: the reference for the sampled step, and a source of truth."""
 
+from typing import Any
+
 import diffrax
 import equinox as eqx
 import jax
@@ -21,7 +23,7 @@ class _Interval(eqx.Module):
     length: Float[Array, ""]
 
 
-def _rates(t: Array, state: Array, interval: _Interval) -> Array:
+def _rates(t: Any, state: Array, interval: _Interval) -> Array:
     vehicle, inverse = interval.vehicle, interval.inverse
     velocity = state[: inverse.shape[0]]
     motion = vehicle.motion(state, parabola(t / interval.length) @ interval.nodes)
@@ -72,6 +74,7 @@ def integrate(
             throw=False,
         )
         # where it gave up, diffrax returns how far it came: a state of an earlier time
+        assert solution.ys is not None
         after = jnp.where(solution.result == diffrax.RESULTS.successful, solution.ys[-1], jnp.nan)
         return after, after
 

@@ -17,7 +17,8 @@ _TERMS, _DOUBLINGS = 10, 12
 def phi_functions(A: Float[Array, "n n"]) -> tuple[Array, Array, Array, Array]:
     r"""$e^A$ and $\varphi_k(A) = \sum_j A^j/(j+k)!$ for k = 1, 2, 3, also where A is singular.
 
-    Taylor series of $A/2^s$, then s doublings $\varphi_k(2A) = 2^{-k}[e^A\varphi_k(A) + \sum_{j=1}^k \varphi_j(A)/(k-j)!]$.
+    Taylor series of $A/2^s$, then s doublings
+    $\varphi_k(2A) = 2^{-k}[e^A\varphi_k(A) + \sum_{j=1}^k \varphi_j(A)/(k-j)!]$.
     This is the block-matrix exponential worked out by blocks of n × n instead of 4n × 4n; good to rounding for
     $\|A\| < 2^{s-1}$ with s = 12. Source: Skaflestad and Wright (2009), Appl. Numer. Math. 59.
     """
@@ -75,7 +76,11 @@ Rates = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 
 def exponential_step(
-    rates: Rates, table: StepTable, velocity: Float[Array, " n"], position: Float[Array, " q"], nodes: Float[Array, "3 m"]
+    rates: Rates,
+    table: StepTable,
+    velocity: Float[Array, " n"],
+    position: Float[Array, " q"],
+    nodes: Float[Array, "3 m"],
 ) -> tuple[Float[Array, " n"], Float[Array, " q"]]:
     """Velocity and position after one step.
 

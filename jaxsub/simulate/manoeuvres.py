@@ -18,7 +18,8 @@ def doublet(times: np.ndarray, start: float, width: float, amplitude: float) -> 
 def three_two_one_one(times: np.ndarray, start: float, unit: float, amplitude: float) -> np.ndarray:
     """Alternating pulses of 3, 2, 1 and 1 `unit` (s) from the time `start`, else zero, (samples,).
 
-    Its power is spread over a decade of frequency. Source: Mulder et al. (1994), AGARD-AG-300 vol. 3; Jategaonkar (2015).
+    Its power is spread over a decade of frequency.
+    Source: Mulder et al. (1994), AGARD-AG-300 vol. 3.
     """
     return _pulses(times, start, (3 * unit, 2 * unit, unit, unit), amplitude)
 

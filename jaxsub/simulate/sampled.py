@@ -35,7 +35,11 @@ class Sampled(eqx.Module):
         return cls(vehicle, inverse, table, runs.substeps)
 
     def step(
-        self, state: Float[Array, " s"], nodes: Float[Array, "3 m"], index: Array, push: Float[Array, "2 n"] | None = None
+        self,
+        state: Float[Array, " s"],
+        nodes: Float[Array, "3 m"],
+        index: Array,
+        push: Float[Array, "2 n"] | None = None,
     ) -> Float[Array, " s"]:
         """The state one sample later.
 

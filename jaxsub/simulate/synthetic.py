@@ -41,14 +41,15 @@ def synthetic(
     """What `vehicle` would have recorded at the times of `recordings`, driven by their inputs.
 
     Each holds the input columns of its recording and a column for each measured channel, SI, with white Gaussian
-    noise of the channel's sigma (none where that is to be estimated, or without `noise`). A channel recorded in an input
-    column, such as a prescribed pitch, stays as it is. `start` is the initial state of each run, `at_rest` by
+    noise of the channel's sigma (none where that is to be estimated, or without `noise`). A channel recorded in an
+    input column, such as a prescribed pitch, stays as it is. `start` is the initial state of each run, `at_rest` by
     default; `states` is `integrate` or `sampled_states`. The noise of run i depends on `seed` and i alone.
 
     **Raises** `InputError` for an input column that is absent or has a gap, and for a run that diverges.
     """
     layout = vehicle.layout
-    driven = [_without_outputs(recording, layout.held + layout.interpolated, layout.channels) for recording in recordings]
+    columns = layout.held + layout.interpolated
+    driven = [_without_outputs(recording, columns, layout.channels) for recording in recordings]
     runs = stack_runs(driven, held=layout.held, interpolated=layout.interpolated, channels=layout.channels)
     start = at_rest(vehicle, len(driven)) if start is None else start
     shown = np.asarray(measure(vehicle, runs, states(vehicle, runs, start)))
@@ -59,7 +60,7 @@ def synthetic(
         _require_finite(recording, outputs)
         draws = np.random.default_rng([seed, index]).standard_normal(outputs.shape)
         measured = dict(zip(layout.channels, (outputs + sigma * draws).T, strict=True))
-        inputs = {name: recording.column(name) for name in layout.held + layout.interpolated}
+        inputs = {name: recording.column(name) for name in columns}
         made.append(Recording(recording.name, recording.times, measured | inputs, f"{recording.source} (synthetic)"))
     return made
 

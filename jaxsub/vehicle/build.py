@@ -134,13 +134,13 @@ def _body(values: dict, layout: Layout, effects: tuple, density: float, where: s
     rigid = {name: values[name] for name in ("mass", "I_x", "I_y", "I_z")}
     restoring = {name: values[name] for name in ("weight", "buoyancy", "x_B", "y_B", "z_B")}
     return SubmergedBody(
-        Inertia(rigid, added),
-        Damping(damping),
-        Control(control),
-        Restoring(restoring, density),
-        values["speed"],
-        layout,
-        effects,
+        inertia=Inertia(rigid, added),
+        damping=Damping(damping),
+        control=Control(control),
+        restoring=Restoring(restoring, density),
+        cruise=values["speed"],
+        layout=layout,
+        effects=effects,
     )
 
 
@@ -151,7 +151,7 @@ def _mechanism(values: dict, layout: Layout, effects: tuple, where: str) -> Mech
     for name in values:
         if name not in known:
             raise unknown_key(f"{where}: coefficients.{name}", tuple(known), name)
-    return Mechanism(values, layout, effects)
+    return Mechanism(coefficients=values, layout=layout, effects=effects)
 
 
 def _check_names(layout: Layout, where: str) -> None:
