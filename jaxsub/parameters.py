@@ -11,7 +11,15 @@ import math
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
+
+
+def number(value: ArrayLike) -> Array:
+    """`value` as an array of the float type in force.
+
+    Python numbers would become weakly typed arrays, and a model that holds one is compiled for again once it is fitted.
+    """
+    return jnp.asarray(value, jnp.result_type(float)) if isinstance(value, float | int) else jnp.asarray(value)
 
 
 @dataclasses.dataclass(frozen=True)

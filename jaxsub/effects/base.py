@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..parameters import Parameter
+from ..parameters import Parameter, number
 from .motion import Facts, Motion
 
 
@@ -26,8 +25,8 @@ def shape(unit: str, sign: int = 0, default: float = 0.0) -> Any:
 
 def _field(role: str, unit: str, sign: int, default: float) -> Any:
     return eqx.field(
-        default_factory=lambda: jnp.asarray(default),
-        converter=jnp.asarray,
+        default_factory=lambda: number(default),
+        converter=number,
         metadata={"role": role, "unit": unit, "sign": sign},
     )
 
@@ -152,5 +151,5 @@ def with_numbers(effect: AbstractEffect, values: dict[str, Array]) -> Any:
     """The same effect with other numbers."""
     names = [field.name for field in number_fields(effect)]
     return eqx.tree_at(
-        lambda e: [getattr(e, n) for n in names], effect, [jnp.asarray(values.get(n, getattr(effect, n))) for n in names]
+        lambda e: [getattr(e, n) for n in names], effect, [number(values.get(n, getattr(effect, n))) for n in names]
     )

@@ -1,6 +1,6 @@
 """Estimation: one `fit`, one `Fit`."""
 
-from .fit import Fit, channel_rms, evaluate, fit, information_matrix, output_errors, search
+from .fit import Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
 from .problem import Problem, initial_guess
 
 __all__ = [
@@ -12,5 +12,6 @@ __all__ = [
     "information_matrix",
     "initial_guess",
     "output_errors",
+    "predict",
     "search",
 ]

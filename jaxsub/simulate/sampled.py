@@ -57,10 +57,15 @@ class Sampled(eqx.Module):
             moved = stack(self.vehicle.position_rates(motion), self.vehicle.layout.positions, velocity[0])
             return self.inverse @ (self.vehicle.force(motion) + force), moved
 
-        velocity, position = state[:n], state[n:]
-        for part in _subdivide(full, self.substeps):
-            velocity, position = exponential_step(rates, weights, velocity, position, part)
-        return jnp.concatenate([velocity, position])
+        def advance(carry: tuple[Array, Array], part: Array) -> tuple[tuple[Array, Array], None]:
+            return exponential_step(rates, weights, *carry, part), None
+
+        carry = (state[:n], state[n:])
+        if self.substeps == 1:
+            carry, _ = advance(carry, full)
+        else:
+            carry, _ = jax.lax.scan(advance, carry, _subdivide(full, self.substeps))
+        return jnp.concatenate(carry)
 
     def states(self, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
         """States at the samples of `runs` from the initial states `start`."""
@@ -82,12 +87,10 @@ def parabola(s: Float[Array, " *k"]) -> Float[Array, "*k 3"]:
     return jnp.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], axis=-1)
 
 
-def _subdivide(nodes: Array, parts: int) -> list[Array]:
+def _subdivide(nodes: Float[Array, "3 m"], parts: int) -> Float[Array, "q 3 m"]:
     """Nodes of `parts` equal pieces of the interval, on the parabola through the three given."""
-    if parts == 1:
-        return [nodes]
     fine = parabola(jnp.arange(2 * parts + 1, dtype=nodes.dtype) / (2.0 * parts)) @ nodes
-    return [fine[2 * i : 2 * i + 3] for i in range(parts)]
+    return fine[2 * jnp.arange(parts)[:, None] + jnp.arange(3)]
 
 
 def simulate(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:

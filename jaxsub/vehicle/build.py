@@ -8,7 +8,7 @@ import numpy as np
 
 from ..effects import CHANNEL_UNITS, EQUATIONS, VELOCITIES, AbstractActuator, AbstractEffect, AbstractSensor
 from ..errors import InputError, nearest
-from ..parameters import Parameter
+from ..parameters import Parameter, number
 from .base import Layout, Output
 from .control import ACTUATORS, Control, needs
 from .damping import Damping
@@ -59,7 +59,7 @@ def build(
     """
     hull = dict(hull or {})
     rows = tuple(row for _, row in numbers.values()) + effect_rows
-    values = {key: jnp.asarray(value) for key, (value, _) in numbers.items()}
+    values = {key: number(value) for key, (value, _) in numbers.items()}
     if kind == "submerged-body":
         values = _complete(values, where)
         hull = _sizes(values, hull)

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..effects import AbstractEffect, Motion
+from ..parameters import number
 from .base import AbstractVehicle, Layout
 
 
@@ -40,7 +41,7 @@ class Mechanism(AbstractVehicle):
 
     def with_own_values(self, values: dict[str, Array]) -> Self:
         """The same mechanism with other coefficients for those named."""
-        updated = {name: jnp.asarray(values.get(name, old)) for name, old in self.coefficients.items()}
+        updated = {name: number(values.get(name, old)) for name, old in self.coefficients.items()}
         return dataclasses.replace(self, coefficients=updated)
 
     def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:
@@ -77,5 +78,5 @@ class Mechanism(AbstractVehicle):
     def _matrix(self, letter: str, diagonal: float = 0.0) -> Float[Array, "n n"]:
         equations = self.layout.equations
         entry = lambda i, j: self.coefficients.get(f"{letter}_{i}_{j}", self._value(f"{letter}_{j}_{i}"))
-        own = lambda i: self.coefficients.get(f"{letter}_{i}", jnp.asarray(diagonal))
+        own = lambda i: self.coefficients.get(f"{letter}_{i}", number(diagonal))
         return jnp.stack([jnp.stack([own(i) if i == j else entry(i, j) for j in equations]) for i in equations])

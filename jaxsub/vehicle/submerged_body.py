@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion
+from ..parameters import number
 from .base import AbstractVehicle, Layout
 from .control import Control
 from .damping import Damping
@@ -51,14 +52,14 @@ class SubmergedBody(AbstractVehicle):
 
     def with_own_values(self, values: dict[str, Array]) -> Self:
         """The same body with other numbers for those named."""
-        update = lambda named: {name: jnp.asarray(values.get(name, old)) for name, old in named.items()}
+        update = lambda named: {name: number(values.get(name, old)) for name, old in named.items()}
         return dataclasses.replace(
             self,
             inertia=Inertia(update(self.inertia.rigid), update(self.inertia.added)),
             damping=Damping(update(self.damping.coefficients)),
             control=Control(update(self.control.coefficients)),
             restoring=dataclasses.replace(self.restoring, values=update(self.restoring.values)),
-            cruise=jnp.asarray(values.get("speed", self.cruise)),
+            cruise=number(values.get("speed", self.cruise)),
         )
 
     def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:

@@ -1,0 +1,5 @@
+"""The command line: arguments in, one call, files out."""
+
+from .app import main
+
+__all__ = ["main"]

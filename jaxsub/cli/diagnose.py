@@ -1,0 +1,50 @@
+"""`jaxsub diagnose`: the whole path."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.panel import Panel
+
+from ..discrepancy import Diagnosis
+from ..discrepancy import diagnose as diagnose_runs
+from ..recording import Recording, hold_out
+from ..report import write_report
+from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
+from . import session
+from .output import fresh_folder, refuse_existing
+
+
+def run(vehicle_path: Path, runs: Sequence[Path], held: Sequence[Path], out: Path, overwrite: bool) -> None:
+    """Diagnose the recordings at `runs`, judged on those at `held` or on what `hold_out` sets aside."""
+    session.start()
+    refuse_existing(out, overwrite)
+    vehicle = read_vehicle(vehicle_path)
+    recordings = session.load_runs(runs, vehicle)
+    train, judged = (recordings, session.load_runs(held, vehicle)) if held else hold_out(recordings)
+    with fresh_folder(out, overwrite) as folder:
+        diagnosis = write_diagnosis(vehicle, train, judged, folder)
+    show(diagnosis, out)
+
+
+def write_diagnosis(
+    vehicle: AbstractVehicle, train: Sequence[Recording], held: Sequence[Recording], folder: Path
+) -> Diagnosis:
+    """Diagnose, and write `diagnosis.json`, `improved.toml`, `report.html` and `figures/` into `folder`."""
+    with session.progress(f"diagnosing {vehicle.layout.name}") as told:
+        diagnosis, improved = diagnose_runs(vehicle, train, held, progress=told)
+        told("writing the report")
+        text = vehicle_text(improved, f"{vehicle.layout.name}, improved by jaxsub\n{diagnosis.summary}")
+        (folder / "improved.toml").write_text(text, encoding="utf-8")
+        (folder / "diagnosis.json").write_text(json.dumps(diagnosis.to_json(), indent=1), encoding="utf-8")
+        write_report(diagnosis, text, folder)
+    return diagnosis
+
+
+def show(diagnosis: Diagnosis, out: Path) -> None:
+    """The verdict on the terminal."""
+    held = diagnosis.fit["held_out"]
+    channel = max(held["baseline"], key=lambda c: held["baseline"][c] / max(held["improved"][c], 1e-12))
+    gain = f"held-out rms/σ of {channel}: {held['baseline'][channel]:.2f} before, {held['improved'][channel]:.2f} after"
+    session.console.print(Panel(f"{diagnosis.summary}\n{gain}", title=diagnosis.verdict, expand=False))
+    session.console.print(f"report: {out / 'report.html'}", highlight=False)

@@ -1,0 +1,47 @@
+"""What every command sets up: double precision, the compilation cache, progress on the terminal."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import jax
+import platformdirs
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from ..recording import Recording, load
+from ..vehicle import AbstractVehicle
+
+console = Console(stderr=True)
+
+
+def start() -> None:
+    """Double precision, and compiled programs kept in the user's cache folder."""
+    jax.config.update("jax_enable_x64", True)
+    folder = Path(platformdirs.user_cache_dir("jaxsub")) / f"jax-{jax.__version__}"
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Callable[[str], None]]:
+    """A spinner that says what is being done; on a pipe, a line for each thing."""
+    if not console.is_terminal:
+        yield lambda message: console.print(f"{title}: {message}", highlight=False)
+        return
+    columns = (SpinnerColumn(), TextColumn("{task.fields[title]}"), TextColumn("[bold]{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("starting", total=None, title=title)
+        yield lambda message: bar.update(task, description=message)
+
+
+def load_runs(paths: Sequence[Path], vehicle: AbstractVehicle) -> list[Recording]:
+    """The recordings at `paths`, refused at once where a column that `vehicle` needs is absent or has a gap."""
+    recordings = [load(path) for path in paths]
+    layout = vehicle.layout
+    for recording in recordings:
+        recording.inputs([*layout.held, *layout.interpolated])
+        for channel in layout.channels:
+            recording.column(channel)
+    return recordings

@@ -1,0 +1,189 @@
+"""The whole path: fit, locate, name, model, show."""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..effects import VOCABULARY, AbstractEffect, candidates
+from ..errors import InputError
+from ..estimate import Fit, fit
+from ..recording import Recording
+from ..recording.runs import Runs, stack_runs
+from ..results import RESULTS
+from ..vehicle import AbstractVehicle
+from .advice import next_manoeuvre
+from .columns import Trajectory, facts
+from .diagnosis import Diagnosis, Location, Physics, Rival, Verdict
+from .locate import Field, effect_share, locate, locations
+from .name import SIGNIFICANCE, Naming, Step, certain, name
+from .show import HeldOut, channel_quality, coefficients, estimates, hold, overlays, record_sigma, run_quality
+from .whiteness import whiteness_p_value
+
+EXPLAINED = 0.75
+
+Progress = Callable[[str], None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Judged:
+    """A verdict, the steps that stand, the mismatch's p-value, and what a reader must know."""
+
+    verdict: Verdict
+    steps: list[Step]
+    p_value: float
+    notes: list[str]
+
+
+def diagnose(
+    vehicle: AbstractVehicle,
+    train: Sequence[Recording],
+    held: Sequence[Recording],
+    *,
+    vocabulary: tuple[type[AbstractEffect], ...] = VOCABULARY,
+    progress: Progress = lambda message: None,
+) -> tuple[Diagnosis, AbstractVehicle]:
+    """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `held`; and the improved vehicle.
+
+    `progress` is told what is being done. **Raises** `InputError` where the recordings lack a column, or the model
+    does not run from the vehicle file's values.
+    """
+    layout = vehicle.layout
+    runs = batch(vehicle, [*train, *held])
+    seen, size = runs.take(range(len(train)), len(train)), len(train)
+    progress("fitting the baseline")
+    baseline = fit(vehicle, seen)
+    if bool(baseline.result == RESULTS.nan_start):
+        remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
+        raise InputError(layout.name, "the model does not run from its starting values", remedy)
+    path = Trajectory.of(baseline)
+    progress("locating the mismatch")
+    field = locate(baseline, path, train)
+    naming = name(baseline, lambda found: candidates(facts(vehicle, found), vocabulary), progress)
+    progress("free runs through what the fit did not see")
+    chosen = range(size, size + len(held))
+    best = naming.steps[-1].fit if naming.steps else baseline
+    sigma = best.sigma
+    before = hold(baseline.vehicle, runs, chosen, size, sigma)
+    after = hold(best.vehicle, runs, chosen, size, sigma) if naming.steps else before
+    judged = judge(baseline, naming, before, after)
+    improved, after = (best, after) if judged.steps else (baseline, before)
+    last_path = Trajectory.of(improved)
+    remaining = locate(improved, last_path, train).traces if judged.steps else field.traces
+    where = _where(judged, baseline, path, field, train)
+    physics = [_physics(step, improved) for step in judged.steps]
+    before_train = channel_scaled(baseline, sigma)
+    diagnosis = Diagnosis(
+        verdict=judged.verdict,
+        vehicle=layout.name,
+        summary=summary(judged.verdict, physics, where),
+        p_value=judged.p_value,
+        where=where,
+        physics=physics,
+        fit={
+            "train": {"baseline": before_train, "improved": channel_scaled(improved, sigma)},
+            "held_out": {"baseline": before.rms, "improved": after.rms},
+        },
+        candidates=naming.candidates,
+        forces=field.traces,
+        remaining_forces=remaining,
+        overlays=overlays(held, layout.channels, before, after),
+        coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, baseline, improved),
+        channels=channel_quality(improved),
+        runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
+        notes=judged.notes,
+        next_manoeuvre=next_manoeuvre(judged.verdict, physics),
+    )
+    return diagnosis, improved.vehicle
+
+
+def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
+    """The recordings as the batch that `vehicle` takes, with as many integration steps a sample as it needs."""
+    layout = vehicle.layout
+    n = len(layout.equations)
+    rates = np.linalg.solve(np.asarray(vehicle.mass_matrix()), np.asarray(vehicle.damping_matrix()))
+    fastest = float(np.max(np.abs(np.linalg.eigvals(rates)))) if n else 0.0
+    longest = max(float(np.diff(r.times).max()) for r in recordings)
+    # linear damping is exact at any step; effects that replace it have the same rate and are not
+    substeps = int(np.clip(np.ceil(longest * fastest / 1.5), 1, 16))
+    return stack_runs(
+        recordings, held=layout.held, interpolated=layout.interpolated, channels=layout.channels, substeps=substeps
+    )
+
+
+def judge(baseline: Fit, naming: Naming, before: HeldOut, after: HeldOut) -> Judged:
+    """The verdict: is there a mismatch, does what was named explain it, and does it help on the held-out runs?"""
+    p_value = min(1.0, 2.0 * min(naming.first_p, whiteness_p_value(baseline)))
+    if not naming.steps:
+        return Judged("unknown" if p_value < SIGNIFICANCE else "none", [], p_value, [])
+    labels = ", ".join(step.label for step in naming.steps)
+    if not after.chi_square < before.chi_square:
+        said = f"{labels} fitted the training runs better but the held-out runs worse, and is not accepted."
+        return Judged("unknown", [], p_value, [said])
+    best = naming.steps[-1].fit
+    share, left = explained(baseline, best), min(naming.last_p, whiteness_p_value(best))
+    if share < EXPLAINED and left < SIGNIFICANCE:
+        said = f"{labels} would explain {share:.0%} of the mismatch, too little for its cause."
+        return Judged("unknown", [], p_value, [said])
+    notes = []
+    if left < SIGNIFICANCE:
+        notes.append(f"{share:.0%} of the mismatch is explained; the residuals are still not white.")
+    verdict: Verdict = "named" if all(certain(step) for step in naming.steps) else "ambiguous"
+    return Judged(verdict, naming.steps, p_value, notes)
+
+
+def explained(baseline: Fit, improved: Fit) -> float:
+    """The share of the baseline's squared residuals above the recordings' own white noise that the improvement removes."""
+    mask, samples = np.asarray(baseline.runs.mask), np.asarray(baseline.runs.samples())
+    sigma = np.asarray(improved.sigma)
+    noise = record_sigma(np.asarray(improved.model.error), mask)
+    squares = lambda fit: float(np.sum((np.asarray(fit.model.error) / sigma) ** 2))
+    floor = float(np.sum(samples * np.minimum(noise / sigma, 1.0) ** 2))
+    above = squares(baseline) - floor
+    return float(np.clip((squares(baseline) - squares(improved)) / above, 0.0, 1.0)) if above > 0.0 else 1.0
+
+
+def channel_scaled(found: Fit, sigma) -> dict[str, float]:  # noqa: ANN001
+    """rms(error)/σ on the training runs with a common σ for baseline and improved."""
+    return {c: found.rms[c] * float(found.sigma[i] / sigma[i]) for i, c in enumerate(found.vehicle.layout.channels)}
+
+
+def _where(
+    judged: Judged, baseline: Fit, path: Trajectory, field: Field, train: Sequence[Recording]
+) -> list[Location]:
+    """Where the mismatch lies: what was named says best, else the missing force itself."""
+    if judged.verdict == "none":
+        return []
+    if not judged.steps:
+        return locations(field, baseline, path, train)
+    last = judged.steps[-1].fit.vehicle.effects
+    return locations(field, baseline, path, train, effect_share(baseline, path, last[-len(judged.steps) :]))
+
+
+def _physics(step: Step, improved: Fit) -> Physics:
+    """An accepted effect with its numbers from the final fit."""
+    effect = next(e for e in improved.vehicle.effects if e.label == step.label)
+    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in step.rivals]
+    return Physics(
+        effect.name,
+        effect.label,
+        list(effect.where),
+        effect.expression,
+        step.probability,
+        estimates(improved, effect.label, effect.symbols()),
+        rivals,
+    )
+
+
+def summary(verdict: Verdict, physics: list[Physics], where: list[Location]) -> str:
+    """The verdict in one sentence."""
+    places = " and ".join(place.where for place in where[:2]) or "no equation"
+    names = ", then ".join(found.effect for found in physics)
+    if verdict == "none":
+        return "The model explains the recordings: nothing significant is left in the residuals."
+    if verdict == "named":
+        return f"The model leaves out {names}, felt in {places}; with it the held-out runs fit better."
+    if verdict == "ambiguous":
+        rivals = sorted({rival.effect for found in physics for rival in found.rivals})
+        return f"Something is missing in {places}: {names}, but these runs cannot tell it from {', '.join(rivals)}."
+    return f"Something is missing in {places}, and nothing in the vocabulary explains it."

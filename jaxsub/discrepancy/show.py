@@ -1,0 +1,119 @@
+"""What the improvement is worth on runs that the fit never saw, and what the recordings are worth."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..effects import CHANNEL_UNITS
+from ..estimate import Fit, channel_rms, output_errors, predict, search
+from ..recording import Recording
+from ..recording.runs import Runs
+from ..vehicle import AbstractVehicle
+from .diagnosis import ChannelQuality, Coefficient, Estimate, Overlay, RunQuality
+
+_WEAK, _OPEN = 0.5, 5.0
+
+
+@dataclasses.dataclass(frozen=True)
+class HeldOut:
+    """A vehicle's free run through runs that its fit did not see: only their initial states were found.
+
+    `predicted` and `error` are lists of (K, c) arrays in SI, a run each; `rms` is rms(error)/σ by channel.
+    """
+
+    predicted: list[np.ndarray]
+    error: list[np.ndarray]
+    rms: dict[str, float]
+    chi_square: float
+
+
+def hold(vehicle: AbstractVehicle, runs: Runs, chosen: Sequence[int], size: int, sigma: Array) -> HeldOut:
+    """`vehicle` on the runs numbered `chosen`, in batches of `size`, the size of the training batch."""
+    predicted, errors = [], []
+    for first in range(0, len(chosen), size):
+        batch = list(chosen[first : first + size])
+        taken = runs.take(batch, size)
+        _, start, *_ = search(vehicle, taken, sigma=sigma, moving=False)
+        predicted += list(np.asarray(predict(vehicle, taken, start))[: len(batch)])
+        errors += list(np.asarray(output_errors(vehicle, taken, start))[: len(batch)])
+    whitened = np.stack(errors) / np.asarray(sigma)
+    rms = channel_rms(jnp.asarray(whitened), runs.take(list(chosen), len(chosen)), vehicle.layout.channels)
+    return HeldOut(predicted, errors, rms, float(np.sum(whitened**2)))
+
+
+def overlays(
+    recordings: Sequence[Recording], channels: tuple[str, ...], baseline: HeldOut, improved: HeldOut
+) -> list[Overlay]:
+    """Measured and modelled outputs of the held-out runs."""
+    drawn = []
+    for recording, before, after in zip(recordings, baseline.predicted, improved.predicted, strict=True):
+        k = len(recording.times)
+        named = lambda table, k=k: {c: table[:k, i] for i, c in enumerate(channels)}
+        measured = {c: recording.column(c) for c in channels}
+        drawn.append(Overlay(recording.name, recording.times, measured, named(before), named(after)))
+    return drawn
+
+
+def coefficients(start: dict[str, float], baseline: Fit, improved: Fit) -> list[Coefficient]:
+    """Every free number before and after."""
+    rows = []
+    for name in improved.names:
+        before = _estimate(baseline, name)
+        after = _estimate(improved, name)
+        assert after is not None
+        rows.append(Coefficient(name, after.unit, start.get(name, 0.0), before, after, _verdict(after)))
+    return rows
+
+
+def _estimate(fit: Fit, name: str) -> Estimate | None:
+    if name not in fit.names:
+        return None
+    unit = next(row.unit for row in fit.vehicle.layout.free if row.name == name)
+    return Estimate(fit.values[name], fit.standard_errors[name], unit)
+
+
+def estimates(fit: Fit, label: str, symbols: dict[str, str]) -> dict[str, Estimate]:
+    """The fitted numbers of one effect by symbol."""
+    found = {symbol: _estimate(fit, f"{label}.{symbol}") for symbol in symbols.values()}
+    return {symbol: estimate for symbol, estimate in found.items() if estimate is not None}
+
+
+def _verdict(estimate: Estimate) -> str:
+    ratio = estimate.standard_error / max(abs(estimate.value), 1e-300)
+    return "identified" if ratio < _WEAK else "weak" if ratio < _OPEN else "not excited"
+
+
+def channel_quality(fit: Fit) -> list[ChannelQuality]:
+    """Samples and noise of each measured channel of the training runs."""
+    mask, error = np.asarray(fit.runs.mask), np.asarray(fit.model.error)
+    white = record_sigma(error, mask)
+    live = 1 + np.asarray(fit.runs.live).sum(1)
+    rows = []
+    for i, output in enumerate(fit.vehicle.layout.outputs):
+        samples = int(mask[..., i].sum())
+        unit = CHANNEL_UNITS.get(output.channel, "")
+        missing = 1.0 - samples / live.sum()
+        sigma = float(fit.sigma[i])
+        rows.append(ChannelQuality(output.channel, unit, samples, missing, sigma, output.sigma is None, float(white[i])))
+    return rows
+
+
+def record_sigma(error: Float[np.ndarray, "r k c"], mask: np.ndarray) -> Float[np.ndarray, " c"]:
+    r"""The white part of each channel's residual, $\sqrt{\tfrac12\langle(e_{k+1}-e_k)^2\rangle}$ (von Neumann 1941), SI."""
+    both = mask[:, 1:] & mask[:, :-1]
+    squares = np.sum(np.where(both, np.diff(error, axis=1), 0.0) ** 2, axis=(0, 1))
+    return np.sqrt(0.5 * squares / np.maximum(both.sum((0, 1)), 1))
+
+
+def run_quality(recordings: Sequence[Recording], role: str) -> list[RunQuality]:
+    """Length and sampling of runs."""
+    rows = []
+    for recording in recordings:
+        dt = np.diff(recording.times)
+        rows.append(
+            RunQuality(recording.name, role, recording.duration, len(dt) + 1, float(np.median(dt)), float(dt.max()))
+        )
+    return rows

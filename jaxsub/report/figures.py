@@ -1,0 +1,14 @@
+"""All figures of a report."""
+
+from ..discrepancy.diagnosis import Diagnosis
+from .bars import draw_coefficients, draw_scan
+from .drawing import Picture, style
+from .forces import draw_forces
+from .overlay import draw_overlay
+
+
+def draw(diagnosis: Diagnosis) -> dict[str, Picture]:
+    """The figures that the diagnosis has data for, by name: `forces`, `scan`, `before-after`, `coefficients`."""
+    with style():
+        drawn = [draw_figure(diagnosis) for draw_figure in (draw_forces, draw_scan, draw_overlay, draw_coefficients)]
+    return {picture.name: picture for picture in drawn if picture is not None}

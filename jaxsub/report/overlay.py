@@ -1,0 +1,97 @@
+"""The before-and-after figure: a run that the fit did not see, measured and modelled."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Overlay
+from .drawing import BASELINE, GREY, IMPROVED, INK, PALE, Picture, drawable, new_figure, panels, plain_ticks, png, thin
+from .text import symbol, unit
+
+_MOST_CHANNELS = 4
+
+
+def affected_channels(diagnosis: Diagnosis, overlay: Overlay) -> list[str]:
+    """The channels of `overlay` that gained most where something was accepted, else those that are worst modelled."""
+    fit = diagnosis.fit.get("held_out", {})
+    baseline, improved = fit.get("baseline", {}), fit.get("improved", {}) if diagnosis.physics else {}
+    gain = {name: baseline.get(name, 0.0) - improved.get(name, 0.0) for name in overlay.measured}
+    return sorted(gain, key=lambda name: -gain[name])[:_MOST_CHANNELS]
+
+
+def telling_overlay(diagnosis: Diagnosis) -> Overlay | None:
+    """The run in which the baseline misses most."""
+    sigma = {channel.channel: channel.sigma for channel in diagnosis.channels}
+
+    def miss(overlay: Overlay) -> float:
+        return max(_rms((overlay.measured[c] - overlay.baseline[c]) / sigma.get(c, 1.0)) for c in overlay.measured)
+
+    return max((overlay for overlay in diagnosis.overlays if overlay.measured), key=miss, default=None)
+
+
+def draw_overlay(diagnosis: Diagnosis) -> Picture | None:
+    """The figure for the most telling unseen run, or None when there is none."""
+    overlay = telling_overlay(diagnosis)
+    if overlay is None:
+        return None
+    names = affected_channels(diagnosis, overlay)
+    alt = f"Measured and modelled {', '.join(names)} in run {overlay.run}, and what remains over its noise"
+    quality = {channel.channel: channel for channel in diagnosis.channels}
+    improved = bool(diagnosis.physics)
+    wide, narrow = (_render(overlay, names, quality, improved, columns) for columns in (2, 1))
+    return Picture("before-after", alt, wide, narrow)
+
+
+def _render(
+    overlay: Overlay, names: list[str], quality: dict[str, ChannelQuality], improved: bool, columns: int
+) -> bytes:
+    columns = min(columns, len(names))
+    rows = -(-len(names) // columns)
+    figure = new_figure(4.9 * columns if columns > 1 else 5.4, 2.75 * rows + 0.8)
+    for name, (above, below) in zip(names, panels(figure, len(names), columns, (2.0, 1.0)), strict=True):
+        known = quality.get(name)
+        _outputs(above, overlay, name, improved)
+        above.set_title(drawable(symbol(name)), fontweight="bold")
+        above.set_ylabel(unit(known.unit) if known else "SI unit")
+        _residuals(below, overlay, name, known.sigma if known else 1.0, improved)
+        below.set_ylabel("residual/σ")
+    figure.suptitle(f"Not fitted: run {drawable(overlay.run, 40)}", x=0.01, ha="left", fontsize=10.5)
+    figure.legend(handles=_legend(improved), loc="outside lower left", ncols=4 if columns > 1 else 2)
+    return png(figure)
+
+
+def _models(overlay: Overlay, name: str, improved: bool) -> list[tuple[np.ndarray, str]]:
+    before = [(overlay.baseline[name], BASELINE)]
+    return [*before, (overlay.improved[name], IMPROVED)] if improved else before
+
+
+def _outputs(axes: Axes, overlay: Overlay, name: str, improved: bool) -> None:
+    axes.plot(*thin(overlay.times, overlay.measured[name]), ".", color=INK, markersize=1.6, alpha=0.45)
+    for values, color in _models(overlay, name, improved):
+        axes.plot(*thin(overlay.times, values), color=color, linewidth=1.3)
+    axes.set_xlim(overlay.times[0], overlay.times[-1])
+    axes.locator_params(axis="y", nbins=5)
+    plain_ticks(axes, x=True, y=True)
+
+
+def _residuals(axes: Axes, overlay: Overlay, name: str, sigma: float, improved: bool) -> None:
+    axes.axhspan(-2.0, 2.0, color=PALE, alpha=0.7, linewidth=0)
+    axes.axhline(0.0, color=GREY, linewidth=0.7)
+    for values, color in _models(overlay, name, improved):
+        residual = (overlay.measured[name] - values) / sigma
+        axes.plot(*thin(overlay.times, residual), ".", color=color, markersize=1.8, alpha=0.7)
+    axes.locator_params(axis="y", nbins=3)
+    plain_ticks(axes, x=True, y=True)
+
+
+def _legend(improved: bool) -> list[Line2D]:
+    dots = {"color": INK, "marker": ".", "linestyle": "none"}
+    handles = [Line2D([], [], label="measured", **dots), Line2D([], [], color=BASELINE, label="baseline model")]
+    if improved:
+        handles.append(Line2D([], [], color=IMPROVED, label="improved model"))
+    return [*handles, Line2D([], [], color=PALE, linewidth=6, label="±2σ of the sensor")]
+
+
+def _rms(values: np.ndarray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else 0.0

@@ -1,0 +1,94 @@
+"""The page: one HTML file with everything in it, and the figures beside it as files."""
+
+import base64
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from ..discrepancy.diagnosis import Diagnosis
+from . import tables, text
+from .bars import top_candidates
+from .drawing import Picture
+from .figures import draw
+from .forces import is_equation, telling_trace
+from .overlay import telling_overlay
+
+_VERDICTS = {
+    "none": "no mismatch",
+    "named": "physics named",
+    "ambiguous": "ambiguous",
+    "unknown": "unknown physics",
+}
+
+
+def write_report(diagnosis: Diagnosis, vehicle_text: str, folder: Path) -> None:
+    """Write `report.html`, which needs no other file, and `figures/*.png` into `folder`.
+
+    `vehicle_text` is the improved vehicle file, of which the page shows the effects. Existing files are replaced.
+    """
+    pictures = draw(diagnosis)
+    figures = folder / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    for name, picture in pictures.items():
+        (figures / f"{name}.png").write_bytes(picture.png)
+    (folder / "report.html").write_text(render(diagnosis, vehicle_text, pictures), encoding="utf-8")
+
+
+def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]) -> str:
+    """The page as text, with `pictures` inlined."""
+    context: dict[str, Any] = {
+        "diagnosis": diagnosis,
+        "verdict": _VERDICTS[diagnosis.verdict],
+        "pictures": pictures,
+        "effects": tables.effects_text(vehicle_text) if diagnosis.physics else "",
+        "key_numbers": _key_numbers(diagnosis),
+        "force_run": telling_trace(diagnosis),
+        "overlay": telling_overlay(diagnosis),
+        "candidates": top_candidates(diagnosis),
+        "fit_columns": tables.fit_columns(diagnosis),
+        "fit_rows": tables.fit_rows(diagnosis),
+        "channel_rows": tables.channel_rows(diagnosis),
+    }
+    return _environment().get_template("template.html.j2").render(context)
+
+
+def _key_numbers(diagnosis: Diagnosis) -> list[tables.KeyNumber]:
+    mismatch = tables.KeyNumber(text.p_value(diagnosis.p_value), "p-value of the mismatch", "corrected for all tried")
+    numbers = [mismatch, tables.gain_number(diagnosis), tables.run_number(diagnosis)]
+    return [number for number in numbers if number is not None]
+
+
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("jaxsub.report", ""),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters.update(
+        number=text.number,
+        percent=text.percent,
+        p_value=text.p_value,
+        symbol=text.symbol,
+        unit=text.unit,
+        formula=text.formula,
+        intervals=tables.intervals,
+        width=_width,
+        embedded=_embedded,
+    )
+    environment.tests["equation"] = is_equation
+    environment.globals["measurement"] = text.measurement
+    return environment
+
+
+def _width(share: float) -> str:
+    """A share as the width of a bar, in CSS."""
+    return f"{100.0 * min(max(share, 0.0), 1.0) if share == share else 0.0:.1f}%"
+
+
+def _embedded(png: bytes) -> Markup:
+    """A PNG as the address of an image that travels with the page."""
+    return Markup("data:image/png;base64,{}").format(base64.b64encode(png).decode("ascii"))

@@ -1,0 +1,136 @@
+"""Numbers, symbols and formulas as a person would write them."""
+
+import math
+import re
+from decimal import Decimal
+
+from markupsafe import Markup, escape
+
+MINUS, TIMES, NARROW_SPACE = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{NARROW NO-BREAK SPACE}"
+UNKNOWN = "\N{EN DASH}"
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_GREEK = dict(zip(
+    ("alpha", "beta", "gamma", "delta", "phi", "theta", "psi", "tau", "kappa", "rho", "omega"), "αβγδφθψτκρω",
+    strict=True,
+))  # fmt: skip
+_PLAIN_EXPONENTS = range(-4, 6)  # powers of ten that are written out
+_SMALLEST_P = 1e-300  # below it a p-value is no longer a number that was computed
+
+
+def power_of_ten(exponent: int) -> str:
+    """`10⁻⁵` for -5."""
+    return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
+
+
+def number(value: float, digits: int = 4) -> str:
+    """`value` to at most `digits` significant digits, without trailing zeros; a dash when it is not a number."""
+    if math.isnan(value):
+        return UNKNOWN
+    if math.isinf(value):
+        return "∞" if value > 0 else f"{MINUS}∞"
+    if value == 0.0:
+        return "0"
+    exponent = _exponent(value, digits)
+    if exponent in _PLAIN_EXPONENTS:
+        return _signed(_strip(_rounded(value, digits - 1 - exponent)))
+    return f"{_signed(_strip(_rounded(_shifted(value, exponent), digits - 1)))} {TIMES} {power_of_ten(exponent)}"
+
+
+def measurement(value: float, error: float) -> str:
+    """`0.610 ± 0.020`: the standard error to two significant digits and the value to the same place."""
+    if not math.isfinite(value) or not math.isfinite(error):
+        return f"{number(value)} ± ∞" if math.isinf(error) else number(value)
+    if error <= 0.0:
+        return number(value)
+    exponent = max(_exponent(value, 2), _exponent(error, 2)) if value else _exponent(error, 2)
+    place = 1 - _exponent(error, 2)
+    if exponent in _PLAIN_EXPONENTS:
+        return f"{_signed(_rounded(value, place))} ± {_rounded(error, place)}"
+    value, error, place = _shifted(value, exponent), _shifted(error, exponent), place + exponent
+    return f"({_signed(_rounded(value, place))} ± {_rounded(error, place)}) {TIMES} {power_of_ten(exponent)}"
+
+
+def p_value(p: float) -> str:
+    """A p-value to two digits, and `< 10⁻³⁰⁰` where it is too small to mean more."""
+    if math.isnan(p):
+        return UNKNOWN
+    return f"< {power_of_ten(-300)}" if p < _SMALLEST_P else number(p, 2)
+
+
+def p_statement(p: float) -> str:
+    """`p = 0.01` or `p < 10⁻³⁰⁰`."""
+    text = p_value(p)
+    return f"p {text}" if text.startswith("<") else f"p = {text}"
+
+
+def percent(share: float) -> str:
+    """A probability or share in percent; never 0 or 100 % for what is only close to it."""
+    if math.isnan(share):
+        return UNKNOWN
+    if 0.0 < share < 0.001:
+        return f"< 0.1{NARROW_SPACE}%"
+    if 0.999 < share < 1.0:
+        return f"> 99.9{NARROW_SPACE}%"
+    hundredths = 100.0 * share
+    digits = 1 if 0.0 < hundredths < 1.0 or 99.0 < hundredths < 100.0 else 0
+    return f"{hundredths:.{digits}f}{NARROW_SPACE}%"
+
+
+def ratio(value: float | None) -> str:
+    """rms(residual)/σ to three digits."""
+    if value is None or math.isnan(value):
+        return UNKNOWN
+    return f"{value:.2f}" if value < 9.995 else f"{value:.1f}" if value < 99.95 else number(value, 3)
+
+
+def symbol(name: str) -> str:
+    """`φ` for `phi`; other names as they are."""
+    return _GREEK.get(name, name)
+
+
+def unit(text: str) -> str:
+    """A unit with its powers set: `N m/(rad/s)²` for `N*m/(rad/s)/(rad/s)`, nothing for a pure number."""
+    if text.strip() == "1":
+        return ""
+    text = re.sub(r"(?:\^|\*\*)(-?\d+)", lambda match: match[1].translate(_SUPERSCRIPTS), text).replace("*", " ")
+    repeated = r"(/(?:\([^()]*\)|\w+))(\1)+"
+    return re.sub(repeated, lambda m: m[1] + str(len(m[0]) // len(m[1])).translate(_SUPERSCRIPTS), text)
+
+
+def formula(text: str) -> Markup:
+    """A formula as HTML: true minus signs, Greek letters by name, and what follows an underscore as a subscript."""
+    text = re.sub(r"-(?![A-Za-z])|(?<![A-Za-z])-", MINUS, text)
+    pieces = re.split(r"([^\W\d_]\w*)", text)
+    return Markup("").join(_identifier(piece) if index % 2 else escape(piece) for index, piece in enumerate(pieces))
+
+
+def _identifier(name: str) -> Markup:
+    base, _, below = name.partition("_")
+    if not below:
+        return escape(symbol(name))
+    below = "".join(symbol(part) for part in below.split("_"))
+    below = re.sub(r"(\w)dot$", "\\1\N{COMBINING DOT ABOVE}", below)
+    return Markup("{}<sub>{}</sub>").format(symbol(base), below)
+
+
+def _exponent(value: float, digits: int) -> int:
+    """The power of ten of `value` once it is rounded to `digits`."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2])
+
+
+def _shifted(value: float, exponent: int) -> float:
+    # Decimal, because 10.0**exponent loses digits or underflows at the ends of the range.
+    return float(Decimal(value).scaleb(-exponent))
+
+
+def _rounded(value: float, place: int) -> str:
+    return f"{round(value, place):.{max(place, 0)}f}"
+
+
+def _strip(text: str) -> str:
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def _signed(text: str) -> str:
+    negative = text.startswith("-") and text.strip("-0.") != ""
+    return f"{MINUS}{text[1:]}" if negative else text.lstrip("-")
