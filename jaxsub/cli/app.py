@@ -1,30 +1,34 @@
 """Commands of `jaxsub` (formats.md)."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
 
 import click
-import typer
 
 from ..errors import InputError
 
-app = typer.Typer(
-    add_completion=False, no_args_is_help=True, help="Fit a vehicle to recordings, and name the physics it leaves out."
-)
+_PATH = click.Path(path_type=Path)
+_vehicle = click.argument("vehicle", type=_PATH)
+_runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
+_overwrite = click.option("--overwrite", is_flag=True, help="Replace what is at --out.")
 
-Vehicle = Annotated[Path, typer.Argument(help="Vehicle file (.toml).")]
-Runs = Annotated[list[Path], typer.Argument(help="Recordings (.csv, .parquet, .nc), one run a file.")]
-Out = Annotated[Path, typer.Option(help="Where the results go.")]
-Overwrite = Annotated[bool, typer.Option(help="Replace what is at --out.")]
+
+def _out(**settings: object) -> Callable:
+    return click.option("--out", type=_PATH, help="Where the results go.", **settings)  # pyright: ignore[reportArgumentType]
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="jaxsub")
+def app() -> None:
+    """Fit a vehicle to recordings, and name the physics it leaves out."""
 
 
 @app.command()
-def demo(
-    out: Out = Path("jaxsub-demo"),
-    seed: Annotated[int, typer.Option(help="Which effect is concealed, and the noise.")] = 0,
-    overwrite: Overwrite = False,
-) -> None:
+@_out(default=Path("jaxsub-demo"), show_default=True)
+@click.option("--seed", default=0, show_default=True, help="Which effect is concealed, and the noise.")
+@_overwrite
+def demo(out: Path, seed: int, overwrite: bool) -> None:
     """Make recordings that conceal an effect, and diagnose them."""
     from . import demo as command
 
@@ -32,7 +36,12 @@ def demo(
 
 
 @app.command()
-def identify(vehicle: Vehicle, runs: Runs, out: Out, overwrite: Overwrite = False) -> None:
+@_vehicle
+@_runs
+@_out(required=True)
+@click.option("--method", type=click.Choice(["gauss-newton"]), default="gauss-newton", show_default=True)
+@_overwrite
+def identify(vehicle: Path, runs: tuple[Path, ...], out: Path, method: str, overwrite: bool) -> None:
     """Estimate the free coefficients, with standard errors and identifiability."""
     from . import identify as command
 
@@ -40,21 +49,24 @@ def identify(vehicle: Vehicle, runs: Runs, out: Out, overwrite: Overwrite = Fals
 
 
 @app.command()
-def diagnose(
-    vehicle: Vehicle,
-    runs: Runs,
-    out: Out,
-    hold_out: Annotated[list[Path] | None, typer.Option(help="A run to judge by and not to fit; repeatable.")] = None,
-    overwrite: Overwrite = False,
-) -> None:
+@_vehicle
+@_runs
+@_out(required=True)
+@click.option("--hold-out", type=_PATH, multiple=True, help="A run to judge by and not to fit; repeatable.")
+@_overwrite
+def diagnose(vehicle: Path, runs: tuple[Path, ...], out: Path, hold_out: tuple[Path, ...], overwrite: bool) -> None:
     """Fit, locate the mismatch, name the missing physics, model it, and show it on held-out runs."""
     from . import diagnose as command
 
-    command.run(vehicle, runs, hold_out or [], out, overwrite)
+    command.run(vehicle, runs, hold_out, out, overwrite)
 
 
 @app.command()
-def simulate(vehicle: Vehicle, run: Path, out: Out, overwrite: Overwrite = False) -> None:
+@_vehicle
+@click.argument("run", type=_PATH)
+@_out(required=True)
+@_overwrite
+def simulate(vehicle: Path, run: Path, out: Path, overwrite: bool) -> None:
     """Write the model's answer to a recording's inputs, as a recording."""
     from . import simulate as command
 
@@ -64,17 +76,17 @@ def simulate(vehicle: Vehicle, run: Path, out: Out, overwrite: Overwrite = False
 def main() -> None:
     """The `jaxsub` command: exit 0 done, 2 bad input with one line on stderr, 1 anything else."""
     try:
-        app(standalone_mode=False)
+        app(standalone_mode=False, prog_name="jaxsub")
     except InputError as error:
-        _stop(f"jaxsub: {error}", 2)
+        _stop(str(error), 2)
     except click.UsageError as error:
-        _stop(f"jaxsub: {' '.join(error.format_message().split())}; see jaxsub --help", 2)
+        _stop(f"{' '.join(error.format_message().split())}; see jaxsub --help", 2)
     except (KeyboardInterrupt, click.Abort):
-        _stop("jaxsub: interrupted; nothing was written", 1)
+        _stop("interrupted; nothing was written", 1)
     except Exception as error:
-        _stop(f"jaxsub: {type(error).__name__}: {' '.join(str(error).split())[:500]}", 1)
+        _stop(f"{type(error).__name__}: {' '.join(str(error).split())[:500]}", 1)
 
 
 def _stop(message: str, code: int) -> None:
-    print(message, file=sys.stderr)
+    print(f"jaxsub: {message}", file=sys.stderr)
     sys.exit(code)

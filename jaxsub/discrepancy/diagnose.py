@@ -64,8 +64,8 @@ def diagnose(
     chosen = range(size, size + len(held))
     best = naming.steps[-1].fit if naming.steps else baseline
     sigma = best.sigma
-    before = hold(baseline.vehicle, runs, chosen, size, sigma)
-    after = hold(best.vehicle, runs, chosen, size, sigma) if naming.steps else before
+    before, *each = [hold(v, runs, chosen, size, sigma) for v in (baseline.vehicle, *(s.fit.vehicle for s in naming.steps))]
+    after = each[-1] if each else before
     judged = judge(baseline, naming, before, after)
     improved, after = (best, after) if judged.steps else (baseline, before)
     last_path = Trajectory.of(improved)
@@ -93,6 +93,10 @@ def diagnose(
         runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
         notes=judged.notes,
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
+        history=[
+            (label, {c: rms * float(s) for (c, rms), s in zip(held_out.rms.items(), sigma, strict=True)})
+            for label, held_out in zip(["baseline", *(s.label for s in naming.steps)], [before, *each], strict=True)
+        ],
     )
     return diagnosis, improved.vehicle
 

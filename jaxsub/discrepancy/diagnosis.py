@@ -136,7 +136,7 @@ class RunQuality:
 class Diagnosis:
     """The answer to "what physics was left out", with all that shows it.
 
-    `fit` maps `train` and `held_out` to `baseline` and `improved` to rms(residual)/σ by channel. `p_value` is that of
+    `history` is (`baseline` or the label of the effect accepted next, held-out rms error by channel in SI). `fit` maps `train` and `held_out` to `baseline` and `improved` to rms(residual)/σ by channel. `p_value` is that of
     the whole mismatch, corrected for everything tried. `summary` is the verdict in one sentence, `notes` what a reader
     must know besides.
     """
@@ -157,6 +157,7 @@ class Diagnosis:
     runs: list[RunQuality]
     notes: list[str]
     next_manoeuvre: str | None
+    history: list[tuple[str, dict[str, float]]] = dataclasses.field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
         """The contents of `diagnosis.json`."""

@@ -158,14 +158,14 @@ def _accept(fit: Fit, refitted: list[Explanation], tried: int, progress: Progres
     return Step(improved, best.effect.label, by_name[best.effect.name], ranked)
 
 
-def _weights(fit: Fit, usable: list[Explanation]) -> np.ndarray:
+def _weights(fit: Fit, usable: list[Explanation]) -> list[float]:
     """Posterior weights of refitted explanations, equal before the data."""
     least = min(usable, key=lambda explanation: explanation.cost)
     samples = float(np.sum(np.asarray(fit.runs.mask)))
     size = np.array([len(number_fields(e.effect)) for e in usable])
     log = -np.array([e.cost for e in usable]) / least.score.inflation - 0.5 * size * np.log(samples)
     weights = np.exp(log - log.max())
-    return weights / weights.sum()
+    return (weights / weights.sum()).tolist()
 
 
 def certain(step: Step) -> bool:

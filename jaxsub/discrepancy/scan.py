@@ -41,11 +41,6 @@ class Score:
     kept: float
     admissible: bool
 
-    @property
-    def evidence(self) -> float:
-        """The statistic that counts: less what coloured residuals fake."""
-        return self.statistic / self.inflation
-
 
 def project(fit: Fit, columns: Float[Array, "r k c q"]) -> tuple[Array, Array, Array]:
     """Whitened columns with the coefficients and initial states projected off, their squares before, and the residual."""
@@ -91,7 +86,7 @@ def block_sums(
 
 
 def scan(fit: Fit, candidates: Sequence[AbstractEffect], path: Trajectory) -> list[Score]:
-    """A score for every candidate, the strongest evidence first."""
+    """A score for every candidate, the largest statistic first."""
     columns, owners = candidate_columns(fit, path, candidates)
     mine = [[j for j, owner in enumerate(owners) if owner == i] for i in range(len(candidates))]
     pairs = [(a, b) for own in mine for a in own for b in own]
@@ -104,7 +99,7 @@ def scan(fit: Fit, candidates: Sequence[AbstractEffect], path: Trajectory) -> li
         G = among[:, first : first + q * q].reshape(-1, q, q)
         first += q * q
         scores.append(_score(effect, towards[:, own], G, before[own], len(candidates)))
-    return sorted(scores, key=lambda score: -score.evidence)
+    return sorted(scores, key=lambda score: -score.statistic)
 
 
 def _score(effect: AbstractEffect, b: np.ndarray, G: np.ndarray, before: np.ndarray, tried: int) -> Score:

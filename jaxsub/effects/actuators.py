@@ -47,12 +47,13 @@ class ActuatorLag(AbstractActuator):
 
     def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
         """The lagged deflection; the actuator starts at rest at its first command."""
-        decay = jnp.exp(-jnp.diff(times) / jnp.maximum(self.T, 1e-6))
+        # over half an interval, and squared: a square root has no derivative where a short lag has faded to zero
+        decay = jnp.exp(-0.5 * jnp.diff(times) / jnp.maximum(self.T, 1e-6))
 
         def interval(held: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
             command, fade = step
-            start, end = held, command + (held - command) * fade
-            middle = command + (held - command) * jnp.sqrt(fade)
+            start, end = held, command + (held - command) * fade**2
+            middle = command + (held - command) * fade
             return end, jnp.stack([start, middle, end])
 
         return jax.lax.scan(interval, nodes[0, 0], (nodes[:, 0], decay))[1]

@@ -122,9 +122,7 @@ def amplitudes(effect: AbstractEffect | type[AbstractEffect]) -> list[str]:
 def options(effect: AbstractEffect) -> dict[str, Any]:
     """The static choices of an effect: its equation, actuator or channel, and fixed sizes."""
     return {
-        field.name: getattr(effect, field.name)
-        for field in dataclasses.fields(effect)
-        if "role" not in field.metadata
+        field.name: getattr(effect, field.name) for field in dataclasses.fields(effect) if "role" not in field.metadata
     }
 
 

@@ -107,7 +107,7 @@ class CrossflowDrag(AbstractForce):
     def candidates(cls, facts: Facts) -> "Sequence[CrossflowDrag]":
         """The planes in which the vehicle is free to both translate and turn."""
         planes = {"horizontal": {"sway", "yaw"}, "vertical": {"heave", "pitch"}}
-        free = set(facts.equations)
+        free = set(facts.equations) if facts.kind == "submerged-body" else set()
         return [cls(plane, facts.length, facts.diameter) for plane, needs in planes.items() if needs <= free]
 
     @property
@@ -150,7 +150,7 @@ class CoriolisCoupling(AbstractForce):
     def candidates(cls, facts: Facts) -> "Sequence[CoriolisCoupling]":
         """One, for a body that can both translate and turn."""
         moves, turns = set(facts.equations) & set(EQUATIONS[:3]), set(facts.equations) & set(EQUATIONS[3:])
-        return [cls(facts.equations)] if moves and turns else []
+        return [cls(facts.equations)] if facts.kind == "submerged-body" and moves and turns else []
 
     @property
     def where(self) -> tuple[str, ...]:
@@ -239,12 +239,19 @@ class SpeedScaling(AbstractForce):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SpeedScaling]":
         """Each lateral equation with the velocities and deflections of its own plane."""
-        planes = {"sway": ("sway", "yaw"), "yaw": ("sway", "yaw"), "heave": ("heave", "pitch"), "pitch": ("heave", "pitch")}
+        planes = {
+            "sway": ("sway", "yaw"),
+            "yaw": ("sway", "yaw"),
+            "heave": ("heave", "pitch"),
+            "pitch": ("heave", "pitch"),
+        }
         planes["roll"] = ("roll",)
         if "surge" not in facts.equations:
             return []
         found = [cls(e, s) for e, plane in planes.items() for s in plane if {e, s} <= set(facts.equations)]
-        rudders = [cls(e, a) for e in ("sway", "yaw") for a in facts.actuators if a == "rudder" and e in facts.equations]
+        rudders = [
+            cls(e, a) for e in ("sway", "yaw") for a in facts.actuators if a == "rudder" and e in facts.equations
+        ]
         planesmen = [
             cls(e, a) for e in ("heave", "pitch") for a in facts.actuators if "elevator" in a or a == "stern_plane"
             if e in facts.equations

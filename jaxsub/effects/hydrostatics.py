@@ -60,6 +60,8 @@ class TrimOffset(AbstractForce):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[TrimOffset]":
         """The axes whose moment a free equation feels."""
+        if facts.kind != "submerged-body":
+            return []
         felt = {"x": {"pitch", "yaw"}, "y": {"roll", "yaw"}, "z": {"roll", "pitch"}}
         return [cls(axis) for axis, equations in felt.items() if equations & set(facts.equations)]
 
@@ -189,4 +191,3 @@ class ThermalExpansion(_ExtraBuoyancy):
     def newton(self, motion: Motion) -> Array:
         """Extra buoyancy, N."""
         return motion.buoyancy * self.alpha * (motion.environment["temperature"] - REFERENCE_TEMPERATURE)
-

@@ -125,7 +125,8 @@ def _prior(problem: Problem, y: Array) -> Float[Array, " d"]:
 def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r s"], Float[Array, " s"]]:
     """Initial states from the first measured sample of each state's channel, else rest at the operating speed."""
     layout = vehicle.layout
-    names = [VELOCITIES.get(e, f"{e}_rate") for e in layout.equations] + list(layout.positions)
+    body = layout.kind == "submerged-body"
+    names = [VELOCITIES[e] if body else f"{e}_rate" for e in layout.equations] + list(layout.positions)
     aliases = {"z": ("z", "depth")}
     mask, outputs = np.asarray(runs.mask), np.asarray(runs.outputs)
     guess = np.zeros((runs.times.shape[0], len(names)))
@@ -134,7 +135,7 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
         spread[i] = _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
         channel = next((c for c in aliases.get(name, (name,)) if c in layout.channels), None)
         if channel is None:
-            guess[:, i] = float(vehicle.own_values()["speed"]) if name == "u" else 0.0
+            guess[:, i] = float(vehicle.own_values()["speed"]) if body and name == "u" else 0.0
             continue
         column = layout.channels.index(channel)
         for run in range(len(guess)):
@@ -143,7 +144,6 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
         # wide enough that the prior weighs nothing against the channel's own first samples
         spread[i] = max(spread[i], _std(outputs[..., column][mask[..., column]]))
     return jnp.asarray(guess), jnp.asarray(spread)
-
 
 
 def _std(samples: np.ndarray) -> float:

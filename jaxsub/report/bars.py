@@ -13,7 +13,7 @@ from .text import number, power_of_ten
 
 MOST_CANDIDATES = 12
 _MOST_COEFFICIENTS = 20
-_WIDTH = 5.2
+_WIDTH = 4.9
 
 
 def top_candidates(diagnosis: Diagnosis) -> list[Candidate]:

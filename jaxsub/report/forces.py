@@ -4,13 +4,30 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ..discrepancy.diagnosis import Diagnosis, ForceTrace, Location
-from .drawing import BASELINE, GREY, IMPROVED, LOCATED, Picture, drawable, new_figure, panels, plain_ticks, png, thin
+from .drawing import (
+    BASELINE,
+    GREY,
+    IMPROVED,
+    LOCATED,
+    NARROW,
+    WIDE,
+    PageWidth,
+    Picture,
+    drawable,
+    new_figure,
+    panels,
+    plain_ticks,
+    png,
+    thin,
+)
+from .text import symbol
 
-_UNITS = dict.fromkeys(("surge", "sway", "heave"), "N") | dict.fromkeys(("roll", "pitch", "yaw"), "N m")
+_UNITS: dict[str, str] = {"surge": "N", "sway": "N", "heave": "N", "roll": "N m", "pitch": "N m", "yaw": "N m"}
 
 
 def force_unit(equation: str) -> str:
@@ -41,7 +58,7 @@ def draw_forces(diagnosis: Diagnosis) -> Picture | None:
         return None
     remaining = next((other for other in diagnosis.remaining_forces if other.run == trace.run), None)
     alt = f"Force beyond the model over time in run {trace.run}, for {', '.join(trace.force)}"
-    wide, narrow = (_render(trace, remaining, diagnosis.where, columns) for columns in (2, 1))
+    wide, narrow = (_render(trace, remaining, diagnosis.where, page) for page in (WIDE, NARROW))
     return Picture("forces", alt, wide, narrow)
 
 
@@ -50,17 +67,17 @@ def _mean_square(force: np.ndarray, band: np.ndarray) -> float:
     return float(np.mean((force[usable] / band[usable]) ** 2)) if usable.any() else 0.0
 
 
-def _render(trace: ForceTrace, remaining: ForceTrace | None, places: Sequence[Location], columns: int) -> bytes:
-    columns = min(columns, len(trace.force))
+def _render(trace: ForceTrace, remaining: ForceTrace | None, places: Sequence[Location], page: PageWidth) -> bytes:
+    columns = min(page.columns, len(trace.force))
     rows = -(-len(trace.force) // columns)
-    figure = new_figure(4.9 * columns if columns > 1 else 5.4, 1.55 * rows + 0.9)
+    figure = new_figure(page.inches, 1.5 * rows + 0.9)
     located = {place.where for place in places}
     for equation, (axes,) in zip(trace.force, panels(figure, len(trace.force), columns), strict=True):
         _shade(axes, trace, places, equation)
         _force_lines(axes, trace, remaining, equation)
         _title(axes, equation, equation in located)
     figure.suptitle(f"Force beyond the model, run {drawable(trace.run, 32)}", x=0.01, ha="left", fontsize=10.5)
-    figure.legend(handles=_legend(remaining is not None, places), loc="outside lower left", ncols=2 * columns)
+    figure.legend(handles=_legend(remaining is not None, places), loc="outside lower left", ncols=2 * page.columns)
     return png(figure)
 
 
@@ -76,22 +93,30 @@ def _shade(axes: Axes, trace: ForceTrace, places: Sequence[Location], equation: 
 def _force_lines(axes: Axes, trace: ForceTrace, remaining: ForceTrace | None, equation: str) -> None:
     force, band = trace.force[equation], 2.0 * trace.band[equation]
     lower, upper = thin(trace.times, force - band), thin(trace.times, force + band)
-    axes.fill(np.r_[lower[0], upper[0][::-1]], np.r_[lower[1], upper[1][::-1]], color=BASELINE, alpha=0.22, linewidth=0)
+    outline = np.column_stack([np.r_[lower[0], upper[0][::-1]], np.r_[lower[1], upper[1][::-1]]])
+    axes.add_collection(PolyCollection([outline], color=BASELINE, alpha=0.22, linewidth=0), autolim=False)
     axes.axhline(0.0, color=GREY, linewidth=0.7)
     axes.plot(*thin(trace.times, force), color=BASELINE)
-    shown = [np.nanmax(np.abs(force), initial=0.0), np.nanmedian(band)]
+    shown = [_quantile(force, 1.0), _quantile(band, 0.5)]
     if remaining is not None and equation in remaining.force:
         axes.plot(*thin(remaining.times, remaining.force[equation]), color=IMPROVED, linewidth=0.8)
-        shown.append(np.nanmax(np.abs(remaining.force[equation]), initial=0.0))
+        shown.append(_quantile(remaining.force[equation], 1.0))
     # The band is widest where a run starts and ends; there it may leave the panel, so that the force stays readable.
     limit = 1.2 * max(shown) or 1.0
     axes.set_ylim(-limit, limit)
     axes.set_xlim(trace.times[0], trace.times[-1])
 
 
+def _quantile(values: np.ndarray, order: float) -> float:
+    finite = np.abs(values[np.isfinite(values)])
+    return float(np.quantile(finite, order)) if finite.size else 0.0
+
+
 def _title(axes: Axes, equation: str, located: bool) -> None:
     weight, color = ("bold", BASELINE) if located else ("normal", GREY)
-    axes.set_title(f"{drawable(equation)}{' — mismatch here' if located else ''}", fontweight=weight, color=color)
+    axes.set_title(
+        f"{drawable(symbol(equation))}{' — mismatch here' if located else ''}", fontweight=weight, color=color
+    )
     axes.set_ylabel(force_unit(equation))
     axes.locator_params(axis="y", nbins=4)
     plain_ticks(axes, x=True, y=True)

@@ -5,7 +5,23 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Overlay
-from .drawing import BASELINE, GREY, IMPROVED, INK, PALE, Picture, drawable, new_figure, panels, plain_ticks, png, thin
+from .drawing import (
+    BASELINE,
+    GREY,
+    IMPROVED,
+    INK,
+    NARROW,
+    PALE,
+    WIDE,
+    PageWidth,
+    Picture,
+    drawable,
+    new_figure,
+    panels,
+    plain_ticks,
+    png,
+    thin,
+)
 from .text import symbol, unit
 
 _MOST_CHANNELS = 4
@@ -38,16 +54,16 @@ def draw_overlay(diagnosis: Diagnosis) -> Picture | None:
     alt = f"Measured and modelled {', '.join(names)} in run {overlay.run}, and what remains over its noise"
     quality = {channel.channel: channel for channel in diagnosis.channels}
     improved = bool(diagnosis.physics)
-    wide, narrow = (_render(overlay, names, quality, improved, columns) for columns in (2, 1))
+    wide, narrow = (_render(overlay, names, quality, improved, page) for page in (WIDE, NARROW))
     return Picture("before-after", alt, wide, narrow)
 
 
 def _render(
-    overlay: Overlay, names: list[str], quality: dict[str, ChannelQuality], improved: bool, columns: int
+    overlay: Overlay, names: list[str], quality: dict[str, ChannelQuality], improved: bool, page: PageWidth
 ) -> bytes:
-    columns = min(columns, len(names))
+    columns = min(page.columns, len(names))
     rows = -(-len(names) // columns)
-    figure = new_figure(4.9 * columns if columns > 1 else 5.4, 2.75 * rows + 0.8)
+    figure = new_figure(page.inches, 2.6 * rows + 0.8)
     for name, (above, below) in zip(names, panels(figure, len(names), columns, (2.0, 1.0)), strict=True):
         known = quality.get(name)
         _outputs(above, overlay, name, improved)
@@ -56,7 +72,7 @@ def _render(
         _residuals(below, overlay, name, known.sigma if known else 1.0, improved)
         below.set_ylabel("residual/σ")
     figure.suptitle(f"Not fitted: run {drawable(overlay.run, 40)}", x=0.01, ha="left", fontsize=10.5)
-    figure.legend(handles=_legend(improved), loc="outside lower left", ncols=4 if columns > 1 else 2)
+    figure.legend(handles=_legend(improved), loc="outside lower left", ncols=2 * page.columns)
     return png(figure)
 
 
@@ -85,8 +101,8 @@ def _residuals(axes: Axes, overlay: Overlay, name: str, sigma: float, improved: 
 
 
 def _legend(improved: bool) -> list[Line2D]:
-    dots = {"color": INK, "marker": ".", "linestyle": "none"}
-    handles = [Line2D([], [], label="measured", **dots), Line2D([], [], color=BASELINE, label="baseline model")]
+    dots = Line2D([], [], color=INK, marker=".", linestyle="none", label="measured")
+    handles = [dots, Line2D([], [], color=BASELINE, label="baseline model")]
     if improved:
         handles.append(Line2D([], [], color=IMPROVED, label="improved model"))
     return [*handles, Line2D([], [], color=PALE, linewidth=6, label="±2σ of the sensor")]

@@ -71,6 +71,7 @@ def _environment() -> jinja2.Environment:
     environment.filters.update(
         number=text.number,
         percent=text.percent,
+        ratio=text.ratio,
         p_value=text.p_value,
         symbol=text.symbol,
         unit=text.unit,

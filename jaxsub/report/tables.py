@@ -7,7 +7,7 @@ import math
 import tomlkit
 
 from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location
-from .text import ratio, symbol
+from .text import number, ratio, symbol
 
 _MOST_INTERVALS = 6  # of one run; more are counted
 _SAME_SIGMA = 1.5  # factor by which stated and recorded noise may differ unremarked
@@ -80,10 +80,14 @@ def gain_number(diagnosis: Diagnosis) -> KeyNumber | None:
     if both:
         best = max(both, key=lambda channel: before[channel] / max(after[channel], 1e-9))
         value = f"{ratio(before[best])} → {ratio(after[best])}"
-        return KeyNumber(value, f"residual/σ of {symbol(best)}, unseen runs", "most improved channel; 1 is the noise")
+        return KeyNumber(
+            value, f"residual/σ of {symbol(best)}, unseen runs", "most improved channel; 1 is the noise floor"
+        )
     if before:
         worst = max(before, key=lambda channel: before[channel])
-        return KeyNumber(ratio(before[worst]), f"residual/σ of {symbol(worst)}, unseen runs", "worst channel; 1 is noise")
+        return KeyNumber(
+            ratio(before[worst]), f"residual/σ of {symbol(worst)}, unseen runs", "worst channel; 1 is the noise floor"
+        )
     return None
 
 
@@ -100,7 +104,7 @@ def intervals(place: Location) -> list[str]:
     """`dive-2: 12–31.5 s, 40–44 s` for each run in which the mismatch is significant."""
     lines = []
     for run in dict.fromkeys(run for run, _, _ in place.times):
-        own = [f"{start:.4g}–{end:.4g}" for name, start, end in place.times if name == run]
+        own = [f"{_seconds(start)}–{_seconds(end)}" for name, start, end in place.times if name == run]
         more = f" and {len(own) - _MOST_INTERVALS} more" if len(own) > _MOST_INTERVALS else ""
         lines.append(f"{run}: {', '.join(own[:_MOST_INTERVALS])} s{more}")
     return lines
@@ -110,6 +114,10 @@ def effects_text(vehicle_text: str) -> str:
     """The `[[effects]]` part of a vehicle file; empty when it has none."""
     effects = tomlkit.parse(vehicle_text).get("effects")
     return tomlkit.dumps({"effects": effects}).strip() if effects else ""
+
+
+def _seconds(time: float) -> str:
+    return number(round(time, 1), 9)
 
 
 def _fit_cell(value: float | None) -> FitCell:

@@ -9,10 +9,10 @@ from markupsafe import Markup, escape
 MINUS, TIMES, NARROW_SPACE = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{NARROW NO-BREAK SPACE}"
 UNKNOWN = "\N{EN DASH}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_GREEK = dict(zip(
-    ("alpha", "beta", "gamma", "delta", "phi", "theta", "psi", "tau", "kappa", "rho", "omega"), "αβγδφθψτκρω",
-    strict=True,
-))  # fmt: skip
+_GREEK: dict[str, str] = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "phi": "φ", "theta": "θ", "psi": "ψ", "tau": "τ",
+    "kappa": "κ", "rho": "ρ", "omega": "ω",
+}  # fmt: skip
 _PLAIN_EXPONENTS = range(-4, 6)  # powers of ten that are written out
 _SMALLEST_P = 1e-300  # below it a p-value is no longer a number that was computed
 
@@ -57,12 +57,6 @@ def p_value(p: float) -> str:
     return f"< {power_of_ten(-300)}" if p < _SMALLEST_P else number(p, 2)
 
 
-def p_statement(p: float) -> str:
-    """`p = 0.01` or `p < 10⁻³⁰⁰`."""
-    text = p_value(p)
-    return f"p {text}" if text.startswith("<") else f"p = {text}"
-
-
 def percent(share: float) -> str:
     """A probability or share in percent; never 0 or 100 % for what is only close to it."""
     if math.isnan(share):
@@ -98,7 +92,8 @@ def unit(text: str) -> str:
 
 
 def formula(text: str) -> Markup:
-    """A formula as HTML: true minus signs, Greek letters by name, and what follows an underscore as a subscript."""
+    """A formula as HTML: true minus signs, bars for `abs`, Greek letters by name, subscripts after an underscore."""
+    text = re.sub(r"\babs\(([^()]*)\)", r"|\1|", text)
     text = re.sub(r"-(?![A-Za-z])|(?<![A-Za-z])-", MINUS, text)
     pieces = re.split(r"([^\W\d_]\w*)", text)
     return Markup("").join(_identifier(piece) if index % 2 else escape(piece) for index, piece in enumerate(pieces))

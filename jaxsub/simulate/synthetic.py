@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -17,6 +18,7 @@ from .sampled import Sampled, measure
 States = Callable[[AbstractVehicle, Runs, Array], Array]
 
 
+@eqx.filter_jit
 def sampled_states(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
     """States at the samples of `runs` by the sampled step; `integrate` gives them by the continuous model."""
     return Sampled.of(vehicle, runs).states(runs, start)

@@ -185,4 +185,6 @@ class AbstractVehicle(eqx.Module):
 
 def stack(named: dict[str, Array], order: tuple[str, ...], like: Array) -> Float[Array, "*k n"]:
     """The named arrays as one, zero where absent, each broadcast to the shape of `like`."""
+    if not order:
+        return jnp.zeros((*like.shape, 0), like.dtype)
     return jnp.stack([jnp.broadcast_to(named.get(name, 0.0), like.shape) for name in order], -1)

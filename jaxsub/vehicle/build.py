@@ -6,7 +6,15 @@ import re
 import jax.numpy as jnp
 import numpy as np
 
-from ..effects import CHANNEL_UNITS, EQUATIONS, VELOCITIES, AbstractActuator, AbstractEffect, AbstractSensor
+from ..effects import (
+    CHANNEL_UNITS,
+    EQUATIONS,
+    VELOCITIES,
+    AbstractActuator,
+    AbstractEffect,
+    AbstractForce,
+    AbstractSensor,
+)
 from ..errors import InputError, nearest
 from ..parameters import Parameter, number
 from .base import Layout, Output
@@ -73,6 +81,7 @@ def build(
     else:
         vehicle = _body(values, layout, effects, hull.get("reference_density", STANDARD_DENSITY), where)
     _check_outputs(vehicle, where)
+    _check_effects(vehicle, where)
     require_inertia(vehicle, where)
     return vehicle
 
@@ -104,9 +113,10 @@ def _complete(values: dict, where: str) -> dict:
 def _sizes(values: dict, hull: dict[str, float]) -> dict[str, float]:
     """Length and diameter: as given, else of the uniform rod that has this mass and pitch inertia."""
     mass = float(values["mass"])
-    length = hull.get("length", math.sqrt(12.0 * float(values["I_y"]) / mass))
-    diameter = hull.get("diameter", math.sqrt(4.0 * mass / STANDARD_DENSITY / (math.pi * length)))
-    return hull | {"length": float(f"{length:.4g}"), "diameter": float(f"{diameter:.4g}")}
+    rounded = lambda size: float(f"{size:.4g}")
+    length = hull.get("length", rounded(math.sqrt(12.0 * float(values["I_y"]) / mass)))
+    diameter = hull.get("diameter", rounded(math.sqrt(4.0 * mass / STANDARD_DENSITY / (math.pi * length))))
+    return hull | {"length": length, "diameter": diameter}
 
 
 def _positions(equations: tuple[str, ...], prescribed: dict[str, str], shown: tuple[str, ...]) -> tuple[str, ...]:
@@ -130,7 +140,9 @@ def _body(values: dict, layout: Layout, effects: tuple, density: float, where: s
             raise unknown_key(place, _all_coefficients(), name)
         ways = needs(name) if name in control else ()
         if ways and not any(set(way) <= actuators for way in ways):
-            raise InputError(place, f"acts through {' and '.join(ways[0])}", "name that actuator's column under [inputs]")
+            raise InputError(
+                place, f"acts through {' and '.join(ways[0])}", "name that actuator's column under [inputs]"
+            )
     rigid = {name: values[name] for name in ("mass", "I_x", "I_y", "I_z")}
     restoring = {name: values[name] for name in ("weight", "buoyancy", "x_B", "y_B", "z_B")}
     return SubmergedBody(
@@ -169,24 +181,53 @@ def _check_names(layout: Layout, where: str) -> None:
     for name, _ in layout.prescribed:
         equation = dict(zip(VELOCITIES.values(), EQUATIONS, strict=True)).get(name)
         if equation in layout.equations:
-            raise InputError(f"{where}: prescribed.{name}", f"{equation} is free", "leave it out of dof or of prescribed")
+            raise InputError(
+                f"{where}: prescribed.{name}", f"{equation} is free", "leave it out of dof or of prescribed"
+            )
 
 
 def _check_outputs(vehicle: SubmergedBody | Mechanism, where: str) -> None:
-    """Refuse channels that the vehicle does not produce and effects on actuators or sensors that it lacks."""
+    """Refuse channels that the vehicle does not produce."""
     layout = vehicle.layout
     own = (f for e in layout.equations for f in (e, f"{e}_rate"))
     known = tuple(CHANNEL_UNITS) if isinstance(vehicle, SubmergedBody) else tuple(own)
     for channel in layout.channels:
         if channel not in known:
             raise unknown_key(f"{where}: outputs.{channel}", known, channel)
-    for effect in vehicle.effects:
+
+
+def _check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
+    """Refuse effects on what the vehicle lacks, and one that is there twice."""
+    layout = vehicle.layout
+    labels = [effect.label for effect in vehicle.effects]
+    for number, effect in enumerate(vehicle.effects, 1):
+        place = f"{where}: effects[{number}] ({effect.name})"
+        if labels.index(effect.label) < number - 1:
+            raise InputError(place, f"{effect.label} is there twice", "delete one")
+        if isinstance(effect, AbstractForce):
+            _check_force(effect, vehicle, place)
         if isinstance(effect, AbstractActuator) and effect.actuator not in dict(layout.inputs):
             hint = nearest(effect.actuator, [n for n, _ in layout.inputs]) or "an actuator of [inputs]"
-            raise InputError(f"{where}: effects.{effect.name}", f"no actuator {effect.actuator}", f"use {hint}")
+            raise InputError(place, f"no actuator {effect.actuator}", f"use {hint}")
         if isinstance(effect, AbstractSensor) and effect.channel not in layout.channels:
             hint = nearest(effect.channel, list(layout.channels)) or "a channel of [outputs]"
-            raise InputError(f"{where}: effects.{effect.name}", f"no channel {effect.channel}", f"use {hint}")
+            raise InputError(place, f"no channel {effect.channel}", f"use {hint}")
+
+
+def _check_force(effect: AbstractForce, vehicle: SubmergedBody | Mechanism, place: str) -> None:
+    """Refuse a force that the vehicle's motion cannot make, or that no free equation feels."""
+    layout = vehicle.layout
+    state = jnp.zeros(len(layout.equations) + len(layout.positions))
+    motion = vehicle.motion(state, jnp.zeros(len(layout.held) + len(layout.interpolated)))
+    try:
+        felt = set(effect.force(motion)) & set(layout.equations)
+    except KeyError as error:  # it looks for a motion, an actuator or a recorded column by its name
+        known = (*layout.equations, *dict(layout.inputs), *dict(layout.environment))
+        raise unknown_key(f"{place}: {error.args[0]}", known, str(error.args[0])) from error
+    if not felt:
+        raise InputError(
+            place, f"acts on {', '.join(effect.where)}", f"free that in dof: {', '.join(layout.equations)}"
+        )
 
 
 def _all_coefficients() -> tuple[str, ...]:

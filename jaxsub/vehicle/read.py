@@ -5,15 +5,27 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from ..effects import VOCABULARY, AbstractEffect, number_fields, options, parameter_table
+from ..effects import EQUATIONS, VOCABULARY, AbstractEffect, number_fields, options, parameter_table
 from ..errors import InputError
 from ..parameters import Parameter
 from .build import BODY_KEYS, VECTORS, build
 from .mechanism import Mechanism
-from .schema import Table, read_number, read_outputs, read_pairs
+from .schema import Table, read_number, read_option, read_outputs, read_pairs, unknown_key
 from .submerged_body import SubmergedBody
 
-_TOP = ("schema", "name", "kind", "dof", "body", "coefficients", "inputs", "prescribed", "environment", "outputs", "effects")
+_TOP = (
+    "schema",
+    "name",
+    "kind",
+    "dof",
+    "body",
+    "coefficients",
+    "inputs",
+    "prescribed",
+    "environment",
+    "outputs",
+    "effects",
+)
 
 
 def read_vehicle(path: str | Path) -> SubmergedBody | Mechanism:
@@ -28,7 +40,7 @@ def read_vehicle(path: str | Path) -> SubmergedBody | Mechanism:
         raise InputError(str(path), f"cannot be read ({error.strerror})", "give the path of a vehicle file") from error
     except UnicodeDecodeError as error:
         raise InputError(str(path), "is not text", "give a vehicle file in TOML, encoded as UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # a number of 5000 digits and 5000 brackets are no TOMLDecodeError
         raise InputError(str(path), f"is not TOML: {error}", "mend it at that place") from error
     return vehicle_from(data, str(path))
 
@@ -41,6 +53,8 @@ def vehicle_from(data: dict[str, Any], where: str) -> SubmergedBody | Mechanism:
         raise InputError(f"{where}: schema", f"is {data['schema']!r}", "this version reads schema = 1")
     kind = top.choice("kind", ("submerged-body", "mechanism"))
     body, extra = _read_body(top) if kind == "submerged-body" else ({}, {})
+    if kind == "mechanism":
+        top.required("dof")
     numbers = dict(body)
     for name, entry in top.table("coefficients").items():
         numbers[name] = read_number(name, entry, f"{where}: coefficients.{name}", free=True)
@@ -91,10 +105,10 @@ def _read_effects(entries: Any, where: str) -> tuple[tuple[AbstractEffect, ...],
     for number, entry in enumerate(entries, 1):
         table = Table(entry, where, f"effects[{number}]")
         kind = kinds[table.choice("effect", tuple(kinds))]
-        chosen = {f.rstrip("_"): f for f in _option_names(kind)}
+        chosen = {field.name.rstrip("_"): field for field in _option_fields(kind)}
         table.only(("effect", "expression", "parameters", *chosen))
-        effect = kind(**{field: _tuple(table.required(key)) for key, field in chosen.items()})
-        table_rows = parameter_table(effect)
+        effect = kind(**{field.name: read_option(table, key, field.type) for key, field in chosen.items()})
+        table_rows = _rows(effect, f"{where}: effects[{number}]")
         symbols = {symbol: field for field, symbol in effect.symbols().items()}
         given = table.table("parameters")
         given.only(tuple(symbols))
@@ -109,10 +123,13 @@ def _read_effects(entries: Any, where: str) -> tuple[tuple[AbstractEffect, ...],
     return tuple(effects), tuple(rows)
 
 
-def _option_names(kind: type[AbstractEffect]) -> list[str]:
+def _option_fields(kind: type[AbstractEffect]) -> list[dataclasses.Field]:
     numeric = {field.name for field in number_fields(kind)}
-    return [field.name for field in dataclasses.fields(kind) if field.name not in numeric]
+    return [field for field in dataclasses.fields(kind) if field.name not in numeric]
 
 
-def _tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+def _rows(effect: AbstractEffect, place: str) -> dict[str, Parameter]:
+    try:
+        return parameter_table(effect)
+    except KeyError as error:  # the names and units of its numbers follow from its equation
+        raise unknown_key(place, EQUATIONS, str(error.args[0])) from error

@@ -59,6 +59,8 @@ class Table:
             return None
         if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
             raise InputError(self.place(key), "is not a list of names", f'write {key} = ["…", "…"]')
+        if twice := [item for i, item in enumerate(value) if item in value[:i]]:
+            raise InputError(self.place(key), f"names {twice[0]} twice", "delete one")
         return tuple(value)
 
 
@@ -84,27 +86,47 @@ def read_number(
     value = _finite(table.data["value"], place)
     fixed = table.data.get("fixed", not table.data.get("free", free))
     if not isinstance(fixed, bool):
-        raise InputError(f"{place}.fixed", f"is {fixed!r}", "write true or false")
+        raise InputError(f"{place}.fixed", f"is {fixed!r:.60}", "write true or false")
     low, high = _bounds(table.data.get("bounds", [lower, math.inf]), place)
     if not low <= value <= high:
         raise InputError(place, f"value {value:g} lies outside its bounds [{low:g}, {high:g}]", "mend one of them")
-    prior = table.data.get("prior_std", math.inf)
-    if not isinstance(prior, int | float) or not prior > 0.0:
-        raise InputError(f"{place}.prior_std", f"is {prior!r}", "give a positive number")
-    return value, Parameter(name, unit, not fixed, low, high, float(prior), value)
+    prior = _real(table.data.get("prior_std", math.inf))
+    if not prior > 0.0:
+        raise InputError(f"{place}.prior_std", f"is {table.data['prior_std']!r:.60}", "give a positive number")
+    return value, Parameter(name, unit, not fixed, low, high, prior, value)
+
+
+def read_option(table: Table, key: str, form: Any) -> Any:
+    """A static choice of an effect: a word, a positive size or, where `form` is a tuple's type, a tuple of words."""
+    value = table.required(key)
+    if form is str and not isinstance(value, str):
+        raise InputError(table.place(key), f"{value!r} is not a word", f'write {key} = "…"')
+    if form is float and not (value := _finite(value, table.place(key))) > 0.0:
+        raise InputError(table.place(key), f"is {value:g}", "give a positive number")
+    return value if form in (str, float) else table.names(key)
 
 
 def _finite(value: Any, place: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(place, f"{value!r} is not a finite number", "give a number in SI units")
-    return float(value)
+    if not math.isfinite(number := _real(value)):
+        raise InputError(place, f"{value!r:.60} is not a finite number", "give a number in SI units")
+    return number
+
+
+def _real(value: Any) -> float:
+    """`value` as a float, NaN where it is not one: TOML also holds whole numbers larger than any float."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
 
 
 def _bounds(value: Any, place: str) -> tuple[float, float]:
-    right = isinstance(value, list) and len(value) == 2 and all(isinstance(v, int | float) for v in value)
-    if not right or not value[0] < value[1]:
-        raise InputError(f"{place}.bounds", f"is {value!r}", "write bounds = [low, high]")
-    return float(value[0]), float(value[1])
+    low, high = map(_real, value) if isinstance(value, list) and len(value) == 2 else (math.nan, math.nan)
+    if not low < high:
+        raise InputError(f"{place}.bounds", f"is {value!r:.60}", "write bounds = [low, high]")
+    return low, high
 
 
 def read_pairs(table: Table) -> tuple[tuple[str, str], ...]:

@@ -48,7 +48,9 @@ class SubmergedBody(AbstractVehicle):
     def own_values(self) -> dict[str, Array]:
         """Body data and coefficients."""
         parts = (self.inertia.rigid, self.inertia.added, self.damping.coefficients, self.control.coefficients)
-        return {name: v for part in (*parts, self.restoring.values) for name, v in part.items()} | {"speed": self.cruise}
+        return {name: v for part in (*parts, self.restoring.values) for name, v in part.items()} | {
+            "speed": self.cruise
+        }
 
     def with_own_values(self, values: dict[str, Array]) -> Self:
         """The same body with other numbers for those named."""
@@ -82,7 +84,9 @@ class SubmergedBody(AbstractVehicle):
     def own_force(self, motion: Motion) -> dict[str, Array]:
         """Control, restoring, and the damping of prescribed velocities."""
         total = self.control.force(motion.actuators)
-        restoring = self.restoring.force(motion.positions["phi"], motion.positions["theta"], jnp.asarray(motion.buoyancy))
+        restoring = self.restoring.force(
+            motion.positions["phi"], motion.positions["theta"], jnp.asarray(motion.buoyancy)
+        )
         for equation, part in restoring.items():
             total[equation] = total.get(equation, 0.0) + part
         moved = [e for e in EQUATIONS if VELOCITIES[e] in dict(self.layout.prescribed)]

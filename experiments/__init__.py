@@ -1,0 +1,1 @@
+"""Experiments: commands that produce the numbers and figures the README quotes."""

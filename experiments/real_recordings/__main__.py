@@ -1,0 +1,27 @@
+"""`python -m experiments.real_recordings NAME --out DIR`: `diagnose` on recordings of real vehicles and rigs."""
+
+import argparse
+import json
+from pathlib import Path
+
+from jaxsub.cli import session
+
+from . import emps, kvlcc2, seaglider
+
+SETS = {"seaglider_sg542": seaglider.report, "kvlcc2_rolldecay": kvlcc2.report, "emps": emps.report}
+
+
+def main() -> None:
+    """Run one set and write `results.json` beside its diagnosis."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name", choices=sorted(SETS))
+    parser.add_argument("--out", type=Path, required=True)
+    chosen = parser.parse_args()
+    session.start()
+    results = SETS[chosen.name](chosen.out)
+    (chosen.out / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
+    print(json.dumps(results, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,79 @@
+"""`jaxsub demo`: recordings that conceal an effect, and the whole path on them."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..effects import AbstractEffect
+from ..effects.actuators import ActuatorLag
+from ..effects.hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, TurningSpeedLoss
+from ..effects.hydrostatics import TrimOffset
+from ..effects.sensors import SensorBias, SensorScale
+from ..recording import Recording, save
+from ..simulate.manoeuvres import prbs
+from ..simulate.synthetic import sampled_states, synthetic
+from ..vehicle import AbstractVehicle, read_vehicle, write_vehicle
+from ..vehicle.catalogue import nps_auv_ii
+from . import session
+from .diagnose import show, write_diagnosis
+from .output import fresh_folder, refuse_existing
+
+_SAMPLES, _INTERVAL, _RUNS = 800, 0.2, 3
+_WRONG = 0.2
+
+
+def concealable(vehicle: AbstractVehicle) -> list[AbstractEffect]:
+    """Effects large enough to matter to an operator, and different enough to be told apart in these runs."""
+    layout = vehicle.layout
+    return [
+        CrossflowDrag("horizontal", layout.length, layout.diameter, 0.7),
+        ActuatorLag("rudder", 0.6),
+        SensorScale("r", 0.06),
+        CoriolisCoupling(layout.equations, 1.0),
+        TurningSpeedLoss("yaw", "yaw", -6000.0),
+        SensorBias("q", 0.0012),
+        HullAsymmetry("yaw", 12.0),
+        TrimOffset("z", 0.03),
+    ]
+
+
+def run(out: Path, seed: int, overwrite: bool) -> None:
+    """Conceal an effect chosen by `seed` in recordings, then diagnose them from their files like a user's own."""
+    session.start()
+    refuse_existing(out, overwrite)
+    with fresh_folder(out, overwrite) as folder:
+        concealed = make_files(folder, seed)
+        vehicle = read_vehicle(folder / "vehicle.toml")
+        runs = session.load_runs(sorted(folder.glob("run*.csv")), vehicle)
+        diagnosis = write_diagnosis(vehicle, runs[:-1], runs[-1:], folder)
+    show(diagnosis, out)
+    session.console.print(f"concealed was: {concealed.label}", highlight=False)
+
+
+def make_files(folder: Path, seed: int) -> AbstractEffect:
+    """Write `vehicle.toml`, whose coefficients are up to 20 % off, and recordings of the true vehicle; return what it conceals."""
+    rng = np.random.default_rng(seed)
+    vehicle = nps_auv_ii()
+    choices = concealable(vehicle)
+    effect = choices[int(rng.integers(len(choices)))]
+    values = vehicle.values()
+    free = [row.name for row in vehicle.layout.free]
+    guess = vehicle.with_values({name: values[name] * (1.0 + _WRONG * rng.uniform(-1.0, 1.0)) for name in free})
+    write_vehicle(guess, folder / "vehicle.toml", "NPS AUV II with coefficients up to 20 % off: where a user starts")
+    driven = [_inputs(number, rng) for number in range(_RUNS)]
+    truth = vehicle.with_effect(effect)
+    for recording in synthetic(truth, driven, seed=seed, states=sampled_states):
+        save(recording, folder / f"{recording.name}.csv", units={"r": "deg/s", "q": "deg/s", "p": "deg/s"})
+    return effect
+
+
+def _inputs(number: int, rng: np.random.Generator) -> Recording:
+    """Rudder and elevators in pseudo-random sequences, as the field excites a body whose coefficients it wants."""
+    t = _INTERVAL * np.arange(_SAMPLES)
+    holds, sizes = (25, 20, 20), (0.25, 0.12, 0.12)
+    names = ("delta_r", "delta_er", "delta_el")
+    seeds = rng.integers(2**31, size=3)
+    columns = {n: prbs(_SAMPLES, h, a, int(s)) for n, h, a, s in zip(names, holds, sizes, seeds, strict=True)}
+    return Recording(f"run{number + 1}", t, columns, "demo")
+
+
