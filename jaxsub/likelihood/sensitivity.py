@@ -69,7 +69,7 @@ def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) 
 
     def steps(model: Sampled, at: Array, push: Array) -> Array:
         nodes = jax.vmap(model.vehicle.actuate)(runs.times, runs.nodes())
-        return jax.vmap(model.step)(at, nodes.reshape(-1, *nodes.shape[2:]), index, push)
+        return jax.vmap(model.step)(at, nodes.reshape(len(before), 3, nodes.shape[-1]), index, push)
 
     def stepped(change: Array) -> Array:
         parameters, moved, push = jnp.split(change, [len(names), len(names) + s])

@@ -1,0 +1,114 @@
+"""The page stands alone, escapes what it quotes, shows what the diagnosis holds, and shrinks with the verdict."""
+
+import dataclasses
+import re
+from html.parser import HTMLParser
+
+import pytest
+from report_examples import VEHICLE, bare, diagnosis
+from report_traces import CHANNELS, COEFFICIENTS
+
+from jaxsub.discrepancy.diagnosis import Rival
+from jaxsub.report.page import render
+
+VERDICTS = ("none", "named", "ambiguous", "unknown")
+VOID = {"meta", "img", "source", "br", "link", "input"}
+
+
+class Outline(HTMLParser):
+    """Collects addresses, headings and text, and checks that every element is closed."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.addresses, self.text, self.open, self.ids, self.tags = [], "", [], [], []
+        self.feed(page)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        values = dict(attributes)
+        self.addresses += [values[key] for key in ("src", "srcset", "href") if key in values]
+        self.ids += [values["id"]] if "id" in values else []
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != "style":
+            self.text += data
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_page_needs_nothing_else(page, verdict):
+    text = page(verdict)
+    outline = Outline(text)
+    images = [address for address in outline.addresses if not address.startswith("#")]
+    assert len(images) >= 3
+    assert all(address.startswith("data:image/png;base64,") for address in images)
+    assert not {"script", "link", "iframe"} & set(outline.tags)
+    assert "http://" not in text and "https://" not in text and "@import" not in text and "url(" not in text
+    assert {address[1:] for address in outline.addresses if address.startswith("#")} <= set(outline.ids)
+
+
+def test_everything_accepted_or_measured_appears(page):
+    text = Outline(page("named")).text
+    made = diagnosis("named")
+    found = made.physics[0]
+    wanted = [made.vehicle, made.summary, found.label, *(rival.label for rival in found.rivals), *made.notes]
+    wanted += [candidate.label for candidate in made.candidates] + [candidate.outcome for candidate in made.candidates]
+    wanted += [name for name, *_ in COEFFICIENTS] + [run.name for run in made.runs] + ["0.614 ± 0.021", "15.4 → 1.10"]
+    assert [thing for thing in wanted if thing not in text] == []
+    rows = {"phi": "φ", "theta": "θ", "psi": "ψ"}
+    assert all(f"<th>{rows.get(name, name)}</th>" in page("named") for name in CHANNELS)
+    assert text.count("⚠") == 2  # p's noise is twice what was stated, and the line that says so
+
+
+@pytest.mark.parametrize(
+    ("verdict", "badge", "sections"),
+    [
+        ("none", "no mismatch", {"where", "what", "gain"}),
+        ("named", "physics named", {"where", "what", "term", "gain"}),
+        ("ambiguous", "ambiguous", {"where", "what", "term", "gain"}),
+        ("unknown", "unknown physics", {"where", "what", "gain"}),
+    ],
+)
+def test_verdict_chooses_sections(page, verdict, badge, sections):
+    text = page(verdict)
+    outline = Outline(text)
+    assert f'<span class="badge {verdict}">{badge}</span>' in text
+    assert set(outline.ids) == sections | {"coefficients", "data", "notes"}
+    accepted = "term" in sections
+    assert (">improved</th>" in text) == accepted
+    assert ("[[effects]]" in outline.text) == accepted
+    assert ("Nothing in the vocabulary explains" in outline.text) == (verdict == "unknown")
+    assert ("cannot tell the candidates apart" in outline.text) == (verdict == "ambiguous")
+    assert ("Next manoeuvre." in outline.text) == (verdict == "ambiguous")
+    assert ("Nowhere significantly" in outline.text) == (verdict == "none")
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_tables_are_never_empty(page, verdict):
+    assert not re.search(r"<tbody>\s*</tbody>", page(verdict))
+
+
+def test_quoted_text_is_escaped():
+    evil = "<script>alert('x')</script>&"
+    made = diagnosis("named")
+    found = dataclasses.replace(
+        made.physics[0], label=evil, expression=evil, equations=[evil], rivals=[Rival(evil, evil, 0.1)]
+    )
+    places = [dataclasses.replace(made.where[0], where=f"input:{evil}", times=[(evil, 0.0, 1.0)], grows_with=[evil])]
+    made = dataclasses.replace(
+        made, vehicle=evil, summary=evil, physics=[found], where=places, notes=[evil], next_manoeuvre=evil
+    )
+    text = render(made, VEHICLE.replace("horizontal", evil), {})
+    assert "<script" not in text and "alert(&#39;x&#39;)" in text
+    Outline(text)
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_least_diagnosis_renders(verdict):
+    outline = Outline(render(bare(verdict), "schema = 1\n", {}))
+    assert {"table", "img", "pre"}.isdisjoint(outline.tags)

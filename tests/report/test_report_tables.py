@@ -1,0 +1,56 @@
+"""Tables say what the numbers say: which columns there are, how far a cell is from the noise, what is suspicious."""
+
+import dataclasses
+
+import tomlkit
+from report_examples import VEHICLE, bare, diagnosis
+
+from jaxsub.discrepancy.diagnosis import Location
+from jaxsub.report import tables
+
+
+def test_fit_table_has_a_column_for_each_model_there_is():
+    both = [("train", "baseline"), ("train", "improved"), ("held_out", "baseline"), ("held_out", "improved")]
+    assert tables.fit_columns(diagnosis("named")) == both
+    assert tables.fit_columns(diagnosis("unknown")) == both[::2]
+    assert tables.fit_columns(bare()) == []
+    rows = {row.channel: row.cells for row in tables.fit_rows(diagnosis("named"))}
+    assert [(cell.text, cell.tone) for cell in rows["v"]] == [
+        ("14.3", "far"), ("1.08", "floor"), ("15.4", "far"), ("1.10", "floor")
+    ]  # fmt: skip
+    assert [cell.tone for cell in rows["phi"]] == ["off", "floor", "off", "floor"]
+
+
+def test_channel_in_one_column_only_has_a_dash_in_the_others():
+    fit = {"train": {"baseline": {"u": 1.0}}, "held_out": {"baseline": {"v": float("nan")}}}
+    rows = tables.fit_rows(dataclasses.replace(bare(), fit=fit))
+    assert [[cell.text for cell in row.cells] for row in rows] == [["1.00", "–"], ["–", "–"]]
+
+
+def test_noise_that_is_not_as_stated_is_flagged_both_ways():
+    made = diagnosis("named")
+    noise = [dataclasses.replace(made.channels[0], sigma=1.0, record_sigma=s) for s in (1.4, 1.6, 0.7, 0.6)]
+    noise.append(dataclasses.replace(made.channels[0], sigma=0.0))
+    rows = tables.channel_rows(dataclasses.replace(made, channels=noise))
+    assert [row.flagged for row in rows] == [False, True, False, True, False]
+
+
+def test_key_numbers():
+    assert tables.gain_number(diagnosis("named")).value == "15.4 → 1.10"
+    assert tables.gain_number(diagnosis("unknown")).value == "15.4"
+    assert tables.gain_number(bare()) is None
+    assert tables.run_number(diagnosis("none")).detail.startswith("2 fitted, 1 held out")
+
+
+def test_intervals_are_told_by_run_and_counted_when_many():
+    many = [("b", float(start), start + 0.25) for start in range(9)]
+    lines = tables.intervals(Location("yaw", 1.0, [("a", 1.0, 1234.56), *many], []))
+    assert lines[0] == "a: 1–1234.6 s"
+    assert lines[1].startswith("b: 0–0.2, 1–1.2,") and lines[1].endswith("5–5.2 s and 3 more")
+
+
+def test_effects_are_cut_out_of_the_vehicle_file_unchanged():
+    cut = tables.effects_text(VEHICLE + "\n[outputs.r]\nsigma = 0.003\n")
+    assert tomlkit.parse(cut).unwrap() == {"effects": tomlkit.parse(VEHICLE)["effects"].unwrap()}
+    assert cut.startswith("[[effects]]")
+    assert tables.effects_text("schema = 1\n") == ""
