@@ -47,27 +47,32 @@ def run(out: Path, seed: int, overwrite: bool) -> None:
         runs = session.load_runs(sorted(folder.glob("run*.csv")), vehicle)
         diagnosis = write_diagnosis(vehicle, runs[:-1], runs[-1:], folder)
     show(diagnosis, out)
-    session.console.print(f"concealed was: {concealed.label}", highlight=False)
+    if concealed is not None:
+        session.console.print(f"concealed was: {concealed.label}", highlight=False)
 
 
-def make_files(folder: Path, seed: int) -> AbstractEffect:
-    """Write `vehicle.toml`, whose coefficients are up to 20 % off, and recordings of the true vehicle; return what it conceals."""
+def make_files(folder: Path, seed: int, *chosen: AbstractEffect | None) -> AbstractEffect | None:
+    """Write `vehicle.toml`, whose coefficients are up to 20 % off, and recordings of the true vehicle.
+
+    Returns what the recordings conceal: the effect (or None) given last, else one that `seed` chooses.
+    """
     rng = np.random.default_rng(seed)
     vehicle = nps_auv_ii()
     choices = concealable(vehicle)
-    effect = choices[int(rng.integers(len(choices)))]
+    drawn = choices[int(rng.integers(len(choices)))]
+    effect = chosen[0] if chosen else drawn
     values = vehicle.values()
     free = [row.name for row in vehicle.layout.free]
     guess = vehicle.with_values({name: values[name] * (1.0 + _WRONG * rng.uniform(-1.0, 1.0)) for name in free})
     write_vehicle(guess, folder / "vehicle.toml", "NPS AUV II with coefficients up to 20 % off: where a user starts")
-    driven = [_inputs(number, rng) for number in range(_RUNS)]
-    truth = vehicle.with_effect(effect)
+    driven = [inputs(number, rng) for number in range(_RUNS)]
+    truth = vehicle if effect is None else vehicle.with_effect(effect)
     for recording in synthetic(truth, driven, seed=seed, states=sampled_states):
         save(recording, folder / f"{recording.name}.csv", units={"r": "deg/s", "q": "deg/s", "p": "deg/s"})
     return effect
 
 
-def _inputs(number: int, rng: np.random.Generator) -> Recording:
+def inputs(number: int, rng: np.random.Generator) -> Recording:
     """Rudder and elevators in pseudo-random sequences, as the field excites a body whose coefficients it wants."""
     t = _INTERVAL * np.arange(_SAMPLES)
     holds, sizes = (25, 20, 20), (0.25, 0.12, 0.12)

@@ -28,7 +28,7 @@ def start() -> None:
 def progress(title: str) -> Iterator[Callable[[str], None]]:
     """A spinner that says what is being done; on a pipe, a line for each thing."""
     if not console.is_terminal:
-        yield lambda message: console.print(f"{title}: {message}", highlight=False)
+        yield lambda message: console.print(f"{title}: {message}", highlight=False, soft_wrap=True)
         return
     columns = (SpinnerColumn(), TextColumn("{task.fields[title]}"), TextColumn("[bold]{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:

@@ -142,9 +142,9 @@ def _respond(effect: AbstractActuator, times: Array, nodes: Array) -> Array:
 def _unit_sensor(fit: Fit, path: Trajectory, effect: AbstractSensor) -> np.ndarray:
     """The change of the outputs per unit of a sensor effect's amplitude, (R, K, c)."""
     (name,) = amplitudes(effect)
-    unit = jax.tree.map(np.asarray, with_numbers(effect, {name: 1.0}))
+    unit = with_numbers(effect, {name: 1.0})
     column = fit.vehicle.layout.channels.index(effect.channel)
     change = np.zeros_like(path.outputs)
     true = path.outputs[..., column]
-    change[..., column] = unit.measure(np.asarray(fit.runs.times), true) - true
+    change[..., column] = np.asarray(unit.measure(fit.runs.times, jnp.asarray(true))) - true
     return change

@@ -24,7 +24,7 @@ from .hull import (
 )
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
 from .mechanisms import CoulombFriction, CubicStiffness
-from .motion import CHANNEL_UNITS, EQUATIONS, FORCES, GRAVITY, VELOCITIES, Facts, Motion
+from .motion import CHANNEL_UNITS, EQUATIONS, FORCES, GRAVITY, VELOCITIES, Facts, Motion, Signal
 from .propulsion import PropellerTorque
 from .sensors import SensorBias, SensorDrift, SensorScale
 
@@ -70,6 +70,7 @@ __all__ = [
     "AbstractSensor",
     "Facts",
     "Motion",
+    "Signal",
     "admissible",
     "amplitudes",
     "candidates",

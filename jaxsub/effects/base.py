@@ -3,14 +3,14 @@
 import abc
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from ..parameters import Parameter, number
-from .motion import Facts, Motion
+from .motion import Facts, Motion, Signal
 
 
 def amplitude(unit: str, sign: int = 0, default: float = 0.0) -> Any:
@@ -75,7 +75,7 @@ class AbstractForce(AbstractEffect):
     """An effect that adds generalised forces to the equations of motion."""
 
     @abc.abstractmethod
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """Generalised force (N or N m) by equation; leading axes follow those of `motion`."""
 
 
@@ -145,7 +145,7 @@ def admissible(effect: AbstractEffect, values: dict[str, float]) -> bool:
     return all(values[name] * sign >= 0.0 for name, sign in signs.items())
 
 
-def with_numbers(effect: AbstractEffect, values: dict[str, Array]) -> Any:
+def with_numbers(effect: AbstractEffect, values: Mapping[str, ArrayLike]) -> Any:
     """The same effect with other numbers."""
     names = [field.name for field in number_fields(effect)]
     return eqx.tree_at(

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array
 
 from .base import AbstractForce, amplitude
-from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion
+from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal
 
 WATER_DENSITY = 1025.0
 
@@ -56,7 +56,7 @@ class _PowerDamping(AbstractForce):
         """Force per power of the velocity."""
         return {"coefficient": _per(self.equation, *(self.equation,) * self.power)}
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The drag along the motion."""
         rate = motion.rates[self.equation]
         return {self.equation: self.coefficient * abs(rate) ** (self.power - 1) * rate}
@@ -122,7 +122,7 @@ class CrossflowDrag(AbstractForce):
             return "-½ρD C_d ∫ (1, x) |v + x r|(v + x r) dx"
         return "-½ρD C_d ∫ (1, -x) |w - x q|(w - x q) dx"
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """Side force and moment, by Gauss-Legendre quadrature along the hull."""
         across, turning, arm = ("sway", "yaw", 1.0) if self.plane == "horizontal" else ("heave", "pitch", -1.0)
         nodes, weights = np.polynomial.legendre.leggauss(16)
@@ -162,7 +162,7 @@ class CoriolisCoupling(AbstractForce):
         """The quadratic form."""
         return "-k C(δν) δν, δν = ν - (U_c, 0, 0, 0, 0, 0)"
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """Forces and moments of the momentum carried around."""
         rates = jnp.stack(jnp.broadcast_arrays(*(motion.rates[e] for e in EQUATIONS)), -1)
         deviation = rates - motion.cruise * jnp.eye(6)[0]
@@ -218,7 +218,7 @@ class TurningSpeedLoss(AbstractForce):
         a, b = (VELOCITIES.get(name, name) for name in (self.first, self.second))
         return f"{self.symbols()['coefficient']} " + (f"{a}²" if a == b else f"{a} {b}")
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The resistance along the motion."""
         known = motion.rates | motion.actuators
         return {"surge": self.coefficient * known[self.first] * known[self.second]}
@@ -277,7 +277,7 @@ class SpeedScaling(AbstractForce):
         """The product."""
         return f"{self.symbols()['coefficient']} (u - U_c) {VELOCITIES.get(self.with_, self.with_)}"
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The extra lift along the motion."""
         known = motion.rates | motion.actuators
         return {self.equation: self.coefficient * (motion.rates["surge"] - motion.cruise) * known[self.with_]}
@@ -317,6 +317,6 @@ class HullAsymmetry(AbstractForce):
         """The constant."""
         return self.symbols()["constant"]
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The constant, along the motion."""
         return {self.equation: self.constant + 0.0 * motion.rates[self.equation]}

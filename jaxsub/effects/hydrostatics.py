@@ -9,12 +9,12 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .base import AbstractForce, amplitude
-from .motion import GRAVITY, Facts, Motion
+from .motion import GRAVITY, Facts, Motion, Signal
 
 REFERENCE_TEMPERATURE = 288.15
 
 
-def lift(motion: Motion, newton: Array) -> dict[str, Array]:
+def lift(motion: Motion, newton: Signal) -> dict[str, Signal]:
     """Body-axis force of `newton` of extra buoyancy: up, turned by the attitude (equations.md §1 with B + ΔB)."""
     phi, theta = motion.positions["phi"], motion.positions["theta"]
     return {
@@ -36,12 +36,12 @@ class _ExtraBuoyancy(AbstractForce):
         """Extra lift is felt in heave first."""
         return ("heave", "surge")
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The extra lift in body axes."""
         return lift(motion, self.newton(motion))
 
     @abc.abstractmethod
-    def newton(self, motion: Motion) -> Array:
+    def newton(self, motion: Motion) -> Signal:
         """Extra buoyancy, N."""
 
 
@@ -83,7 +83,7 @@ class TrimOffset(AbstractForce):
             "z": "K += Δz_B B sinφ cosθ, M += Δz_B B sinθ",
         }[self.axis]
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The moments along the motion."""
         phi, theta = motion.positions["phi"], motion.positions["theta"]
         arm = self.offset * motion.buoyancy
@@ -112,7 +112,7 @@ class BuoyancyError(_ExtraBuoyancy):
         """The constant."""
         return "ΔB"
 
-    def newton(self, motion: Motion) -> Array:
+    def newton(self, motion: Motion) -> Signal:
         """Extra buoyancy, N."""
         return self.delta_B + 0.0 * motion.positions["theta"]
 
@@ -138,7 +138,7 @@ class HullCompressibility(_ExtraBuoyancy):
         """The lost buoyancy."""
         return "ΔB = -B κ ρ g z"
 
-    def newton(self, motion: Motion) -> Array:
+    def newton(self, motion: Motion) -> Signal:
         """Extra buoyancy, N."""
         return -motion.buoyancy * self.kappa * 1025.0 * GRAVITY * motion.positions["z"]
 
@@ -163,7 +163,7 @@ class DensityStratification(_ExtraBuoyancy):
         """The gained buoyancy."""
         return "ΔB = B γ z"
 
-    def newton(self, motion: Motion) -> Array:
+    def newton(self, motion: Motion) -> Signal:
         """Extra buoyancy, N."""
         return motion.buoyancy * self.gamma * motion.positions["z"]
 
@@ -188,6 +188,6 @@ class ThermalExpansion(_ExtraBuoyancy):
         """The gained buoyancy."""
         return "ΔB = B α (T - 288.15 K)"
 
-    def newton(self, motion: Motion) -> Array:
+    def newton(self, motion: Motion) -> Signal:
         """Extra buoyancy, N."""
         return motion.buoyancy * self.alpha * (motion.environment["temperature"] - REFERENCE_TEMPERATURE)

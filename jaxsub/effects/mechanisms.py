@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .base import AbstractForce, amplitude
-from .motion import Facts, Motion
+from .motion import Facts, Motion, Signal
 
 
 class CoulombFriction(AbstractForce):
@@ -42,7 +42,7 @@ class CoulombFriction(AbstractForce):
         """Friction and offset."""
         return f"-F_c sign({self.equation}') - F_0"
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The friction along the motion."""
         return {self.equation: -self.F_c * jnp.tanh(motion.rates[self.equation] / self.smoothing) - self.F_0}
 
@@ -70,6 +70,6 @@ class CubicStiffness(AbstractForce):
         """The restoring force."""
         return f"-k_3 {self.equation}³"
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The restoring force along the motion."""
         return {self.equation: -self.k_3 * motion.positions[self.equation] ** 3}

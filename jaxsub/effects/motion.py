@@ -1,7 +1,11 @@
 """What a force, an actuator or a sensor may look at: the motion at one time, or along a whole run."""
 
 import equinox as eqx
+import numpy as np
 from jaxtyping import Array, Float
+
+# forces are plain array arithmetic, so they run on JAX arrays inside a simulation and on NumPy ones along a stored run
+Signal = Array | np.ndarray
 
 EQUATIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 VELOCITIES: dict[str, str] = dict(zip(EQUATIONS, "uvwpqr", strict=True))
@@ -30,13 +34,13 @@ class Motion(eqx.Module):
     - `cruise`: the operating speed U_c (m/s) about which linear coefficients were taken.
     """
 
-    rates: dict[str, Array]
-    positions: dict[str, Array]
-    actuators: dict[str, Array]
-    environment: dict[str, Array]
+    rates: dict[str, Signal]
+    positions: dict[str, Signal]
+    actuators: dict[str, Signal]
+    environment: dict[str, Signal]
     inertia: Float[Array, "n n"]
-    buoyancy: Array | float
-    cruise: Array | float
+    buoyancy: Signal | float
+    cruise: Signal | float
 
 
 class Facts(eqx.Module):

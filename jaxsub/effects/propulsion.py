@@ -7,7 +7,7 @@ import equinox as eqx
 from jaxtyping import Array
 
 from .base import AbstractForce, amplitude
-from .motion import Facts, Motion
+from .motion import Facts, Motion, Signal
 
 
 class PropellerTorque(AbstractForce):
@@ -47,7 +47,7 @@ class PropellerTorque(AbstractForce):
         """A moment, per what it grows with."""
         return {"torque": {"shaft_speed": "N*m/(rad/s)/(rad/s)", "thrust": "m", "constant": "N*m"}[self.grows_with]}
 
-    def force(self, motion: Motion) -> dict[str, Array]:
+    def force(self, motion: Motion) -> dict[str, Signal]:
         """The reaction along the motion."""
         if self.grows_with == "shaft_speed":
             n = motion.actuators["shaft_speed"]

@@ -200,9 +200,9 @@ def _check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
     """Refuse effects on what the vehicle lacks, and one that is there twice."""
     layout = vehicle.layout
     labels = [effect.label for effect in vehicle.effects]
-    for number, effect in enumerate(vehicle.effects, 1):
-        place = f"{where}: effects[{number}] ({effect.name})"
-        if labels.index(effect.label) < number - 1:
+    for index, effect in enumerate(vehicle.effects):
+        place = f"{where}: effects[{index + 1}] ({effect.name})"
+        if labels.index(effect.label) < index:
             raise InputError(place, f"{effect.label} is there twice", "delete one")
         if isinstance(effect, AbstractForce):
             _check_force(effect, vehicle, place)

@@ -1,0 +1,87 @@
+"""Rooms import only rooms to their left, files stay short, and importing any of them has no side effect."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import jaxsub
+
+HOUSE = Path(jaxsub.__file__).parent
+FILES = sorted(HOUSE.rglob("*.py"))
+# design.md, with effects before vehicle, which has them built in
+ORDER = (
+    "errors", "units", "parameters", "results", "recording", "effects", "sensors", "vehicle", "simulate", "filter",
+    "navigation", "likelihood", "estimate", "identifiability", "discrepancy", "control", "sweep", "report", "cli",
+    "__main__",
+)  # fmt: skip
+
+
+def room(path):
+    """The room that a file is in, or is."""
+    return path.relative_to(HOUSE).parts[0].removesuffix(".py")
+
+
+def imported(path, tree):
+    """The rooms that a file imports, by absolute and by relative imports, wherever in it they stand."""
+    package = ("jaxsub", *path.relative_to(HOUSE).parts[:-1])
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [alias.name.split(".") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = list(package[: len(package) + 1 - node.level]) if node.level else []
+            base += node.module.split(".") if node.module else []
+            names = [[*base, alias.name] for alias in node.names]
+        else:
+            continue
+        yield from (name[1] for name in names if name[0] == "jaxsub" and len(name) > 1)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOUSE)))
+def test_file_imports_only_rooms_to_its_left(path):
+    if path == HOUSE / "__init__.py":
+        pytest.skip("the house itself")
+    here = room(path)
+    assert here in ORDER, f"{here} is a new room: give it a place in ORDER"
+    for other in imported(path, ast.parse(path.read_text(encoding="utf-8"))):
+        assert other in ORDER, f"imports {other}, which is no room"
+        assert ORDER.index(other) <= ORDER.index(here), f"{here} imports {other}"
+
+
+def test_the_reader_of_imports_sees_every_form():
+    absolute, relative = (
+        "import jaxsub.cli\nfrom jaxsub import report\n",
+        "from ..vehicle.base import x\nfrom .. import units\n",
+    )
+    source = ast.parse(absolute + relative + "from .a import b")
+    found = list(imported(HOUSE / "effects" / "hull.py", source))
+    assert found == ["cli", "report", "vehicle", "units", "effects"]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOUSE)))
+def test_file_is_short_and_says_what_it_is_for(path):
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 400
+    assert ast.get_docstring(ast.parse(text))
+
+
+def test_importing_every_module_prints_nothing_and_changes_no_setting():
+    modules = sorted(
+        ".".join(("jaxsub", *path.relative_to(HOUSE).with_suffix("").parts)).removesuffix(".__init__")
+        for path in FILES
+        if path.stem != "__main__"
+    )
+    script = f"""
+import importlib, warnings
+warnings.simplefilter("error")
+import jax, matplotlib, numpy
+before = jax.config.jax_enable_x64, dict(matplotlib.rcParams), numpy.random.get_state()[1].tolist(), numpy.geterr()
+for name in {modules!r}:
+    importlib.import_module(name)
+after = jax.config.jax_enable_x64, dict(matplotlib.rcParams), numpy.random.get_state()[1].tolist(), numpy.geterr()
+assert before == after
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=HOUSE.parent, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

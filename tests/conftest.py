@@ -1,0 +1,15 @@
+"""What every test starts from: 64-bit numbers, annotated shapes checked at each call, compiled code kept."""
+
+import jax
+import jaxtyping
+import pytest
+
+jax.config.update("jax_enable_x64", True)
+# Before any test imports jaxsub, since only modules imported later are checked.
+jaxtyping.install_import_hook("jaxsub", "typechecking.checked")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if cache := getattr(config, "cache", None):
+        jax.config.update("jax_compilation_cache_dir", str(cache.mkdir("jax")))
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)

@@ -1,0 +1,127 @@
+"""Diagnosis names what was concealed and shows it on unseen runs, is silent on clean ones, and says when it does not know."""
+
+import json
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import tomllib
+
+from jaxsub.discrepancy import diagnose
+from jaxsub.effects import AbstractForce
+from jaxsub.effects.base import amplitude
+from jaxsub.effects.hull import CrossflowDrag, HullAsymmetry
+from jaxsub.effects.sensors import SensorScale
+from jaxsub.vehicle import vehicle_from, vehicle_text
+
+from diagnosis_cases import recorded, wrong
+
+
+class LayerForce(AbstractForce):
+    """A heave force that comes and goes with depth: no effect of the vocabulary does."""
+
+    name: ClassVar[str] = "layer-force"
+    family: ClassVar[str] = "test"
+    size: object = amplitude("N")
+
+    @classmethod
+    def candidates(cls, facts):
+        return []
+
+    @property
+    def where(self):
+        return ("heave",)
+
+    @property
+    def expression(self):
+        return "a sin(2 z)"
+
+    def force(self, motion):
+        return {"heave": self.size * jnp.sin(2.0 * motion.positions["z"])}
+
+
+def run(effect, seed=5):
+    runs = recorded(effect, seed)
+    return diagnose(wrong(), runs[:2], runs[2:])
+
+
+@pytest.mark.parametrize("effect", [CrossflowDrag("vertical", 5.0, 0.761, 2.0), SensorScale("q", 0.05)])
+def test_names_locates_and_improves(effect):
+    found, improved = run(effect)
+    assert found.verdict == "named"
+    (physics,) = found.physics
+    assert physics.effect == effect.name
+    assert found.where[0].where in effect.where
+    for estimate in physics.parameters.values():
+        truth = float(getattr(effect, next(iter(effect.symbols()))))
+        assert abs(estimate.value - truth) < 4.0 * estimate.standard_error
+    before, after = (found.fit["held_out"][key] for key in ("baseline", "improved"))
+    assert max(before.values()) > 1.2
+    assert max(after.values()) < 1.15
+    content = json.loads(json.dumps(found.to_json()))
+    assert content["schema"] == 1 and content["physics"][0]["effect"] == effect.name
+    again = vehicle_from(tomllib.loads(vehicle_text(improved)), "improved")
+    runs = recorded(effect, 5)
+    assert diagnose(again, runs[:2], runs[2:])[0].verdict == "none"
+
+
+def test_nothing_concealed_is_none():
+    found, _ = run(None)
+    assert (found.verdict, found.physics, found.where) == ("none", [], [])
+    assert found.p_value > 0.01
+    assert found.fit["held_out"]["baseline"] == found.fit["held_out"]["improved"]
+
+
+def test_near_twins_are_ambiguous_with_their_rivals():
+    found, _ = run(HullAsymmetry("pitch", 300.0))
+    names = {physics.effect for physics in found.physics}
+    rivals = {rival.effect for physics in found.physics for rival in physics.rivals}
+    assert found.verdict == "ambiguous"
+    assert {"hull-asymmetry", "trim-offset"} <= names | rivals
+    assert found.next_manoeuvre
+
+
+def test_outside_the_vocabulary_is_unknown_and_located():
+    found, _ = run(LayerForce(400.0))
+    assert found.verdict == "unknown"
+    assert found.physics == []
+    assert found.p_value < 1e-6
+    assert found.where[0].where == "heave"
+    trace = found.forces[0]
+    assert np.max(np.abs(trace.force["heave"]) / trace.band["heave"]) > 3.0
+
+
+def test_the_located_force_is_the_one_that_acts():
+    effect = LayerForce(400.0)
+    found, _ = run(effect)
+    runs = recorded(effect, 5)
+    errors = []
+    for trace, recording in zip(found.forces, runs[:2], strict=True):
+        truth = 400.0 * np.sin(2.0 * recording.column("z"))
+        smooth = np.interp(trace.times, recording.times, truth)
+        assert np.corrcoef(smooth, trace.force["heave"])[0, 1] > 0.5
+        errors.append(np.abs(trace.force["heave"] - smooth) / trace.band["heave"])
+    assert np.median(np.concatenate(errors)) < 3.0
+
+
+def test_missing_samples_change_nothing_but_the_precision():
+    effect = SensorScale("q", 0.05)
+    runs = list(recorded(effect, 5))
+    rng = np.random.default_rng(2)
+    thinned = []
+    for recording in runs:
+        columns = dict(recording.columns)
+        for channel in ("w", "q", "theta", "z"):
+            gaps = rng.random(len(recording.times)) < 0.3
+            columns[channel] = np.where(gaps, np.nan, columns[channel])
+        thinned.append(type(recording)(recording.name, recording.times, columns, recording.source))
+    found, _ = diagnose(wrong(), thinned[:2], thinned[2:])
+    assert [physics.effect for physics in found.physics] == ["sensor-scale"]
+
+
+def test_effects_are_modules_that_survive_the_jit():
+    effect = LayerForce(2.0)
+    leaves = eqx.filter_jit(lambda e: e.size * 2.0)(effect)
+    assert float(leaves) == 4.0

@@ -1,0 +1,157 @@
+"""Whatever a vehicle file holds, it is read as a vehicle that runs, or refused in one line that names the file."""
+
+import copy
+import tomllib
+
+import jax
+import jax.numpy as jnp
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from jaxsub.errors import InputError
+from jaxsub.vehicle import read_vehicle, vehicle_from
+
+BODY = """
+schema = 1
+name = "glider"
+kind = "submerged-body"
+dof = ["surge", "heave", "pitch"]
+[body]
+mass = { value = 50.0, fixed = false, bounds = [40, inf] }
+inertia = [1.0, 9.0, 9.0]
+speed = 0.3
+length = 2.0
+[coefficients]
+X_u = -5.0
+Z_wdot = { value = -80, fixed = true, prior_std = 3 }
+[inputs]
+rudder = "delta_r"
+[prescribed]
+phi = "roll"
+[environment]
+density = "rho"
+[outputs.az]
+sigma = 0.1
+lever_arm = [0.1, 0, 0.2]
+[outputs.theta]
+sigma = "estimate"
+[[effects]]
+effect = "quadratic-damping"
+equation = "pitch"
+expression = "M_qq |q| q"
+parameters = { M_qq = -3.0 }
+[[effects]]
+effect = "actuator-lag"
+actuator = "rudder"
+parameters.T = { value = 0.2, bounds = [0, 1] }
+[[effects]]
+effect = "crossflow-drag"
+plane = "vertical"
+length = 2
+diameter = 0.2
+[[effects]]
+effect = "coriolis-coupling"
+equations = ["surge", "heave"]
+[[effects]]
+effect = "sensor-bias"
+channel = "theta"
+"""
+RIG = """
+schema = 1
+name = "rig"
+kind = "mechanism"
+dof = ["x", "y"]
+coefficients = { I_x = 2, I_y = 1, I_x_y = 0.1, K_x = 3, B_x_motor = 1 }
+inputs = { motor = "u" }
+outputs = { x = { sigma = 0.1 }, y_rate = {} }
+effects = [{ effect = "coulomb-friction", equation = "x", smoothing = 0.1 }]
+"""
+fuzz = settings(
+    derandomize=True, deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+def is_read_or_refused(make, name):
+    try:
+        vehicle = make()
+    except InputError as error:
+        assert str(error).startswith(name)
+        assert len(str(error).splitlines()) == 1
+    else:
+        runs(vehicle)
+
+
+def runs(vehicle):
+    """Raises where the vehicle cannot be evaluated."""
+    layout = vehicle.layout
+    state = jnp.zeros((2, len(layout.equations) + len(layout.positions)))
+    signals = jnp.zeros((2, len(layout.held) + len(layout.interpolated)))
+    nodes = jnp.zeros((1, 3, signals.shape[1]))
+    times = jnp.arange(2.0)
+    assert jax.eval_shape(vehicle.acceleration, state, signals).shape == (2, len(layout.equations))
+    assert jax.eval_shape(vehicle.measure, times, state, signals).shape == (2, len(layout.channels))
+    assert jax.eval_shape(vehicle.actuate, times, nodes).shape == nodes.shape
+
+
+def from_text(path, text):
+    path.write_bytes(text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass"))
+    is_read_or_refused(lambda: read_vehicle(path), str(path))
+
+
+@fuzz
+@given(st.text(max_size=60) | st.binary(max_size=60))
+def test_any_text(tmp_path, text):
+    from_text(tmp_path / "vehicle.toml", text)
+
+
+@pytest.mark.parametrize(
+    "text", ["a = " + "[" * 5000, "a = " + "9" * 5000, "schema = 1\nname = 'a'\nkind = [[['mechanism']]]", "a = 1e999"]
+)
+def test_text_that_strains_a_parser(tmp_path, text):
+    from_text(tmp_path / "vehicle.toml", text)
+
+
+@pytest.mark.parametrize("text", [BODY, RIG], ids=["body", "rig"])
+@fuzz
+@given(
+    edits=st.lists(
+        st.tuples(st.floats(0, 1), st.integers(0, 12), st.text('[]{}="\n.,-+ 0129aeXYdot_inf', max_size=4)), max_size=3
+    )
+)
+def test_a_file_with_typing_errors(tmp_path, text, edits):
+    for place, cut, typed in edits:
+        at = int(place * len(text))
+        text = text[:at] + typed + text[at + cut :]
+    from_text(tmp_path / "vehicle.toml", text)
+
+
+numbers = st.floats() | st.integers() | st.sampled_from([0, -1, 1e308, 10**400, float("nan"), float("inf")])
+words = st.sampled_from(["", "surge", "pitch", "x", "rudder", "theta", "mechanism", "submerged-body", "density", "X_u"])
+leaves = numbers | st.booleans() | words | st.text(max_size=3) | st.none()
+trees = st.recursive(leaves, lambda t: st.lists(t, max_size=3) | st.dictionaries(words, t, max_size=2), max_leaves=5)
+
+
+def places(data, path=()):
+    """The path of everything in a tree of tables and lists."""
+    children = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, child in children:
+        yield (*path, key)
+        yield from places(child, (*path, key))
+
+
+@pytest.mark.parametrize("text", [BODY, RIG], ids=["body", "rig"])
+@fuzz
+@given(data=st.data())
+def test_a_file_with_other_values_in_it(text, data):
+    tree = tomllib.loads(text)
+    for path in data.draw(st.lists(st.sampled_from(list(places(tree))), min_size=1, max_size=2)):
+        *above, last = path
+        table = tree
+        try:
+            for key in above:
+                table = table[key]
+            table[last] = copy.deepcopy(data.draw(trees))
+        except (KeyError, IndexError, TypeError):  # an earlier change took the place away
+            continue
+    is_read_or_refused(lambda: vehicle_from(tree, "vehicle.toml"), "vehicle.toml")
