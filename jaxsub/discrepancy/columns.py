@@ -142,9 +142,14 @@ def _respond(effect: AbstractActuator, times: Array, nodes: Array) -> Array:
 def _unit_sensor(fit: Fit, path: Trajectory, effect: AbstractSensor) -> np.ndarray:
     """The change of the outputs per unit of a sensor effect's amplitude, (R, K, c)."""
     (name,) = amplitudes(effect)
-    unit = with_numbers(effect, {name: 1.0})
-    column = fit.vehicle.layout.channels.index(effect.channel)
-    change = np.zeros_like(path.outputs)
-    true = path.outputs[..., column]
-    change[..., column] = np.asarray(unit.measure(fit.runs.times, jnp.asarray(true))) - true
-    return change
+    column = np.zeros_like(path.outputs)
+    column[..., fit.vehicle.layout.channels.index(effect.channel)] = sensor_change(
+        fit, path, with_numbers(effect, {name: 1.0})
+    )[0]
+    return column
+
+
+def sensor_change(fit: Fit, path: Trajectory, effect: AbstractSensor) -> tuple[np.ndarray, np.ndarray]:
+    """What a sensor effect changes in its channel, and the channel without it, (R, K) each."""
+    true = path.outputs[..., fit.vehicle.layout.channels.index(effect.channel)]
+    return np.asarray(effect.measure(fit.runs.times, jnp.asarray(true))) - true, true

@@ -62,12 +62,11 @@ def diagnose(
     naming = name(baseline, lambda found: candidates(facts(vehicle, found), vocabulary), progress)
     progress("free runs through what the fit did not see")
     chosen = range(size, size + len(held))
-    best = naming.steps[-1].fit if naming.steps else baseline
-    sigma = best.sigma
-    before, *each = [hold(v, runs, chosen, size, sigma) for v in (baseline.vehicle, *(s.fit.vehicle for s in naming.steps))]
-    after = each[-1] if each else before
-    judged = judge(baseline, naming, before, after)
-    improved, after = (best, after) if judged.steps else (baseline, before)
+    sigma = (naming.steps[-1].fit if naming.steps else baseline).sigma
+    models = [baseline, *(step.fit for step in naming.steps)]
+    held_out = [hold(model.vehicle, runs, chosen, size, sigma) for model in models]
+    judged = judge(baseline, naming, held_out)
+    before, improved, after = held_out[0], models[len(judged.steps)], held_out[len(judged.steps)]
     last_path = Trajectory.of(improved)
     remaining = locate(improved, last_path, train).traces if judged.steps else field.traces
     where = _where(judged, baseline, path, field, train)
@@ -94,8 +93,8 @@ def diagnose(
         notes=judged.notes,
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
         history=[
-            (label, {c: rms * float(s) for (c, rms), s in zip(held_out.rms.items(), sigma, strict=True)})
-            for label, held_out in zip(["baseline", *(s.label for s in naming.steps)], [before, *each], strict=True)
+            (label, {c: rms * float(s) for (c, rms), s in zip(seen.rms.items(), sigma, strict=True)})
+            for label, seen in zip(["baseline", *(s.label for s in naming.steps)], held_out, strict=True)
         ],
     )
     return diagnosis, improved.vehicle
@@ -115,25 +114,33 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     )
 
 
-def judge(baseline: Fit, naming: Naming, before: HeldOut, after: HeldOut) -> Judged:
-    """The verdict: is there a mismatch, does what was named explain it, and does it help on the held-out runs?"""
+def judge(baseline: Fit, naming: Naming, held_out: Sequence[HeldOut]) -> Judged:
+    """The verdict: is there a mismatch, does what was named explain it, and does it help on the held-out runs?
+
+    Effects count up to the first that makes the held-out runs worse; `held_out` holds the baseline's and each step's.
+    """
     p_value = min(1.0, 2.0 * min(naming.first_p, whiteness_p_value(baseline)))
     if not naming.steps:
         return Judged("unknown" if p_value < SIGNIFICANCE else "none", [], p_value, [])
-    labels = ", ".join(step.label for step in naming.steps)
-    if not after.chi_square < before.chi_square:
-        said = f"{labels} fitted the training runs better but the held-out runs worse, and is not accepted."
-        return Judged("unknown", [], p_value, [said])
-    best = naming.steps[-1].fit
-    share, left = explained(baseline, best), min(naming.last_p, whiteness_p_value(best))
+    squares = [free_run.chi_square for free_run in held_out]
+    helped = next((i for i, gain in enumerate(np.diff(squares)) if not gain < 0.0), len(naming.steps))
+    steps, notes = naming.steps[:helped], []
+    if helped < len(naming.steps):
+        refused = naming.steps[helped].label
+        notes.append(f"{refused} fitted the training runs better but the held-out runs worse, and is not accepted.")
+    if not steps:
+        return Judged("unknown", [], p_value, notes)
+    best = steps[-1].fit
+    left = min(naming.last_p, whiteness_p_value(best))
+    share = explained(baseline, best)
     if share < EXPLAINED and left < SIGNIFICANCE:
-        said = f"{labels} would explain {share:.0%} of the mismatch, too little for its cause."
-        return Judged("unknown", [], p_value, [said])
-    notes = []
+        labels = ", ".join(step.label for step in steps)
+        notes.append(f"{labels} would explain {share:.0%} of the mismatch, too little for its cause.")
+        return Judged("unknown", [], p_value, notes)
     if left < SIGNIFICANCE:
         notes.append(f"{share:.0%} of the mismatch is explained; the residuals are still not white.")
-    verdict: Verdict = "named" if all(certain(step) for step in naming.steps) else "ambiguous"
-    return Judged(verdict, naming.steps, p_value, notes)
+    verdict: Verdict = "named" if all(certain(step) for step in steps) else "ambiguous"
+    return Judged(verdict, steps, p_value, notes)
 
 
 def explained(baseline: Fit, improved: Fit) -> float:

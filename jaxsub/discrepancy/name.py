@@ -15,7 +15,7 @@ from ..effects import AbstractEffect, admissible, number_fields, with_numbers
 from ..estimate import Fit, evaluate, search
 from .columns import Trajectory
 from .diagnosis import Candidate
-from .scan import ABSORBED, Score, scan
+from .scan import ABSORBED, Score, plausible, scan
 
 SIGNIFICANCE = 0.01
 MOST_EFFECTS = 3
@@ -69,9 +69,10 @@ def name(baseline: Fit, vocabulary: Callable[[Fit], Sequence[AbstractEffect]], p
         progress(f"scanning the vocabulary ({len(steps)} effects so far)")
         present = {effect.label for effect in fit.vehicle.effects}
         tried = [c for c in vocabulary(fit) if c.label not in present]
-        scores = scan(fit, tried, Trajectory.of(fit))
+        path = Trajectory.of(fit)
+        scores = scan(fit, tried, path)
         last_p = min((score.p_value for score in scores), default=1.0)
-        refitted = _refit(fit, scores, progress) if len(steps) < MOST_EFFECTS else []
+        refitted = _refit(fit, path, scores, progress) if len(steps) < MOST_EFFECTS else []
         if not table:
             first_p, table = last_p, _table(scores, refitted)
         step = _accept(fit, refitted, len(tried), progress)
@@ -94,16 +95,16 @@ def contenders(scores: Sequence[Score]) -> list[Score]:
     return near[:_REFITS]
 
 
-def _refit(fit: Fit, scores: Sequence[Score], progress: Progress) -> list[Explanation]:
+def _refit(fit: Fit, path: Trajectory, scores: Sequence[Score], progress: Progress) -> list[Explanation]:
     """The contenders joined to the model and fitted, two at a time since compiling leaves the other core idle."""
     chosen = contenders(scores)
     if chosen:
         progress(f"refitting {', '.join(score.effect.label for score in chosen)}")
     with ThreadPoolExecutor(2) as pool:
-        return list(pool.map(lambda score: refit(fit, score), chosen))
+        return list(pool.map(lambda score: refit(fit, path, score), chosen))
 
 
-def refit(fit: Fit, score: Score) -> Explanation:
+def refit(fit: Fit, path: Trajectory, score: Score) -> Explanation:
     """All coefficients fitted again with the candidate in the model, from its predicted size or a tenth of it."""
     tries = []
     for share in (1.0, 0.1):
@@ -118,6 +119,7 @@ def refit(fit: Fit, score: Score) -> Explanation:
     effect = found[0].effects[-1]
     values = {f.name: float(getattr(effect, f.name)) for f in number_fields(effect)}
     right = bool(np.isfinite(cost)) and admissible(effect, values) and _alive(effect, values)
+    right = right and plausible(effect, path, fit)
     return Explanation(score, found, cost if np.isfinite(cost) else np.inf, right)
 
 

@@ -15,10 +15,10 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 from scipy import stats
 
-from ..effects import AbstractEffect, admissible, amplitudes, with_numbers
+from ..effects import AbstractEffect, AbstractSensor, admissible, amplitudes, with_numbers
 from ..estimate import Fit, Problem
 from ..likelihood import Linearised
-from .columns import Trajectory, candidate_columns
+from .columns import Trajectory, candidate_columns, sensor_change
 
 ABSORBED = 1e-5
 _BLOCKS = 24
@@ -98,7 +98,8 @@ def scan(fit: Fit, candidates: Sequence[AbstractEffect], path: Trajectory) -> li
         q = len(own)
         G = among[:, first : first + q * q].reshape(-1, q, q)
         first += q * q
-        scores.append(_score(effect, towards[:, own], G, before[own], len(candidates)))
+        score = _score(effect, towards[:, own], G, before[own], len(candidates))
+        scores.append(dataclasses.replace(score, admissible=score.admissible and plausible(score.effect, path, fit)))
     return sorted(scores, key=lambda score: -score.statistic)
 
 
@@ -120,6 +121,14 @@ def _score(effect: AbstractEffect, b: np.ndarray, G: np.ndarray, before: np.ndar
     # a lag that wants to be of the other sign shows as a negative share of its own grid value
     right = admissible(effect, values) if names else bool(amplitude[0] > 0.0)
     return Score(with_numbers(effect, values), statistic, len(before), inflation, p_value, kept, right)
+
+
+def plausible(effect: AbstractEffect, path: Trajectory, fit: Fit) -> bool:
+    """Whether a sensor's error is smaller than what the sensor shows: a larger one is no sensor error but a way out."""
+    if not isinstance(effect, AbstractSensor):
+        return True
+    change, shown = sensor_change(fit, path, effect)
+    return float(np.ptp(change)) <= float(np.ptp(shown))
 
 
 def score_inflation(blocks: np.ndarray, white: float) -> float:

@@ -28,7 +28,9 @@ def recorded(effect: AbstractEffect | None, seed: int) -> tuple[Recording, ...]:
     """Three runs of the true vehicle, by the continuous reference, with sensor noise."""
     vehicle = dsrv() if effect is None else dsrv().with_effect(effect)
     t = INTERVAL * np.arange(SAMPLES)
+    # growing deflections: at one amplitude a drag's growth with speed hides in the linear damping
+    grown = np.linspace(0.1, 0.6, SAMPLES)
     driven = [
-        Recording(f"run{i}", t, {"delta_s": prbs(SAMPLES, 12, 0.2, 100 * seed + i)}, "test") for i in range(3)
+        Recording(f"run{i}", t, {"delta_s": grown * prbs(SAMPLES, 12, 1.0, 100 * seed + i)}, "test") for i in range(3)
     ]
     return tuple(synthetic(vehicle, driven, seed=seed, states=integrate))

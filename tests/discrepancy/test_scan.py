@@ -66,7 +66,7 @@ def test_projection_matches_a_dense_regression(clean):
 
 @pytest.mark.parametrize(
     ("effect", "field", "tolerance"),
-    [(CrossflowDrag("vertical", 5.0, 0.761, 2.0), "C_d", 0.25), (SensorScale("q", 0.05), "scale", 0.15)],
+    [(CrossflowDrag("vertical", 5.0, 0.761, 0.3), "C_d", 0.25), (SensorScale("q", 0.05), "scale", 0.15)],
 )
 def test_the_concealed_effect_comes_first_with_its_amplitude(effect, field, tolerance):
     found = fit(wrong(), batch(wrong(), recorded(effect, 2)[:2]))
