@@ -3,7 +3,8 @@
 import optimistix as optx
 
 
-class RESULTS(optx.RESULTS):
+# an equinox Enumeration, which may be subclassed, but pyright is told that it is an `enum.Enum`
+class RESULTS(optx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
     """Outcomes of a fit. Failures are values, so that they can be masked and counted under `vmap`."""
 
     nan_start = "The model does not run from these starting values: a residual is not finite there."

@@ -30,7 +30,7 @@ from .setup import recordings_and_vehicle, write_files
 _REPEATS = 7
 
 
-def median_seconds(call) -> float:  # noqa: ANN001
+def median_seconds(call) -> float:
     """The median time of a call after one that is not counted."""
     call()
     spent = []

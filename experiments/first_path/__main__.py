@@ -55,7 +55,9 @@ def case(seed: int, concealed: str | AbstractEffect | None, *, again: bool = Fal
             line["located"] = bool(found.where) and found.where[0].where in effect.where
         if again:
             line["again"] = judge(folder, "improved.toml").verdict
-    session.console.print(f"{line['concealed']}: {line['verdict']} {line['named']} {line['seconds']:.0f} s", highlight=False)
+    session.console.print(
+        f"{line['concealed']}: {line['verdict']} {line['named']} {line['seconds']:.0f} s", highlight=False
+    )
     return line
 
 

@@ -49,5 +49,7 @@ def report(out: Path) -> dict:
             found.label: {s: [e.value, e.standard_error] for s, e in found.parameters.items()}
             for found in diagnosis.physics
         },
-        "coefficients": {c.name: [c.improved.value, c.improved.standard_error] for c in diagnosis.coefficients if c.improved},
+        "coefficients": {
+            c.name: [c.improved.value, c.improved.standard_error] for c in diagnosis.coefficients if c.improved
+        },
     }

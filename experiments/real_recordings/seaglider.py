@@ -105,5 +105,9 @@ def field_units(parameters: dict) -> dict:
     named = {}
     for symbol, estimate in parameters.items():
         factor, unit = units.get(symbol, (1.0, estimate.unit))
-        named[symbol] = {"value": factor * estimate.value, "standard_error": factor * estimate.standard_error, "unit": unit}
+        named[symbol] = {
+            "value": factor * estimate.value,
+            "standard_error": factor * estimate.standard_error,
+            "unit": unit,
+        }
     return named

@@ -59,7 +59,7 @@ def make_files(folder: Path, seed: int, *chosen: AbstractEffect | None) -> Abstr
     rng = np.random.default_rng(seed)
     vehicle = nps_auv_ii()
     choices = concealable(vehicle)
-    drawn = choices[int(rng.integers(len(choices)))]
+    drawn = choices[seed % len(choices)]
     effect = chosen[0] if chosen else drawn
     values = vehicle.values()
     free = [row.name for row in vehicle.layout.free]
@@ -80,5 +80,3 @@ def inputs(number: int, rng: np.random.Generator) -> Recording:
     seeds = rng.integers(2**31, size=3)
     columns = {n: prbs(_SAMPLES, h, a, int(s)) for n, h, a, s in zip(names, holds, sizes, seeds, strict=True)}
     return Recording(f"run{number + 1}", t, columns, "demo")
-
-

@@ -28,7 +28,9 @@ def run(vehicle_path: Path, runs: Sequence[Path], out: Path, overwrite: bool) ->
             told("fitting")
             found = fit(vehicle, batch(vehicle, recordings))
         if bool(found.result == RESULTS.nan_start):
-            raise InputError(str(vehicle_path), "the model does not run from these values", "give values that are closer")
+            raise InputError(
+                str(vehicle_path), "the model does not run from these values", "give values that are closer"
+            )
         said = identifiability(found)
         _write(found, said, folder)
     _show(found, said)

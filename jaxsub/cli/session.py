@@ -30,7 +30,12 @@ def progress(title: str) -> Iterator[Callable[[str], None]]:
     if not console.is_terminal:
         yield lambda message: console.print(f"{title}: {message}", highlight=False, soft_wrap=True)
         return
-    columns = (SpinnerColumn(), TextColumn("{task.fields[title]}"), TextColumn("[bold]{task.description}"), TimeElapsedColumn())
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.fields[title]}"),
+        TextColumn("[bold]{task.description}"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting", total=None, title=title)
         yield lambda message: bar.update(task, description=message)

@@ -16,11 +16,13 @@ from .advice import next_manoeuvre
 from .columns import Trajectory, facts
 from .diagnosis import Diagnosis, Location, Physics, Rival, Verdict
 from .locate import Field, effect_share, locate, locations
-from .name import SIGNIFICANCE, Naming, Step, certain, name
+from .name import Naming, Step, certain, name
+from .refit import SIGNIFICANCE
 from .show import HeldOut, channel_quality, coefficients, estimates, hold, overlays, record_sigma, run_quality
 from .whiteness import whiteness_p_value
 
 EXPLAINED = 0.75
+_TWIN = 0.01
 
 Progress = Callable[[str], None]
 
@@ -59,7 +61,7 @@ def diagnose(
     path = Trajectory.of(baseline)
     progress("locating the mismatch")
     field = locate(baseline, path, train)
-    naming = name(baseline, lambda found: candidates(facts(vehicle, found), vocabulary), progress)
+    naming = name(baseline, vehicle, lambda found: candidates(facts(vehicle, found), vocabulary), progress)
     progress("free runs through what the fit did not see")
     chosen = range(size, size + len(held))
     sigma = (naming.steps[-1].fit if naming.steps else baseline).sigma
@@ -137,10 +139,27 @@ def judge(baseline: Fit, naming: Naming, held_out: Sequence[HeldOut]) -> Judged:
         labels = ", ".join(step.label for step in steps)
         notes.append(f"{labels} would explain {share:.0%} of the mismatch, too little for its cause.")
         return Judged("unknown", [], p_value, notes)
+    notes += mirrored(naming, steps[0])
     if left < SIGNIFICANCE:
         notes.append(f"{share:.0%} of the mismatch is explained; the residuals are still not white.")
     verdict: Verdict = "named" if all(certain(step) for step in steps) else "ambiguous"
     return Judged(verdict, steps, p_value, notes)
+
+
+def mirrored(naming: Naming, step: Step) -> list[str]:
+    """Effects that leave the trace of the accepted one with the opposite sign: only the difference of the two is told."""
+    scored = {candidate.label: candidate for candidate in naming.candidates}
+    accepted = scored.get(step.label)
+    if accepted is None:
+        return []
+    twins = [
+        candidate.effect
+        for candidate in naming.candidates
+        if candidate.outcome == "of inadmissible sign"
+        and abs(candidate.statistic / max(accepted.statistic, 1e-300) - 1.0) < _TWIN
+    ]
+    said = "leaves the same trace with the opposite sign: the recordings tell only the difference of the two."
+    return [f"{twin} {said} {step.label} is what is left of it." for twin in twins]
 
 
 def explained(baseline: Fit, improved: Fit) -> float:
@@ -154,14 +173,12 @@ def explained(baseline: Fit, improved: Fit) -> float:
     return float(np.clip((squares(baseline) - squares(improved)) / above, 0.0, 1.0)) if above > 0.0 else 1.0
 
 
-def channel_scaled(found: Fit, sigma) -> dict[str, float]:  # noqa: ANN001
+def channel_scaled(found: Fit, sigma) -> dict[str, float]:
     """rms(error)/σ on the training runs with a common σ for baseline and improved."""
     return {c: found.rms[c] * float(found.sigma[i] / sigma[i]) for i, c in enumerate(found.vehicle.layout.channels)}
 
 
-def _where(
-    judged: Judged, baseline: Fit, path: Trajectory, field: Field, train: Sequence[Recording]
-) -> list[Location]:
+def _where(judged: Judged, baseline: Fit, path: Trajectory, field: Field, train: Sequence[Recording]) -> list[Location]:
     """Where the mismatch lies: what was named says best, else the missing force itself."""
     if judged.verdict == "none":
         return []

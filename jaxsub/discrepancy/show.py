@@ -97,7 +97,9 @@ def channel_quality(fit: Fit) -> list[ChannelQuality]:
         unit = CHANNEL_UNITS.get(output.channel, "")
         missing = 1.0 - samples / live.sum()
         sigma = float(fit.sigma[i])
-        rows.append(ChannelQuality(output.channel, unit, samples, missing, sigma, output.sigma is None, float(white[i])))
+        rows.append(
+            ChannelQuality(output.channel, unit, samples, missing, sigma, output.sigma is None, float(white[i]))
+        )
     return rows
 
 

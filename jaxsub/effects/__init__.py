@@ -1,4 +1,4 @@
-"""The vocabulary of left-out physics: every effect that a diagnosis may name, a file a family."""
+"""The vocabulary of left-out physics: every effect that a diagnosis may name, a file or two a family."""
 
 from .actuators import ActuatorDelay, ActuatorLag
 from .base import (
@@ -13,15 +13,8 @@ from .base import (
     parameter_table,
     with_numbers,
 )
-from .hull import (
-    CoriolisCoupling,
-    CrossflowDrag,
-    CubicDamping,
-    HullAsymmetry,
-    QuadraticDamping,
-    SpeedScaling,
-    TurningSpeedLoss,
-)
+from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss
+from .hull_damping import CubicDamping, QuadraticDamping
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
 from .mechanisms import CoulombFriction, CubicStiffness
 from .motion import CHANNEL_UNITS, EQUATIONS, FORCES, GRAVITY, VELOCITIES, Facts, Motion, Signal

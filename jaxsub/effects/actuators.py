@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..parameters import number
 from .base import AbstractActuator, shape
 from .motion import Facts
 
@@ -38,7 +39,7 @@ class ActuatorLag(AbstractActuator):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[ActuatorLag]":
         """Each actuator with each time constant of a grid."""
-        return [cls(name, T) for name in facts.actuators for T in _grid(facts)]
+        return [cls(name, number(T)) for name in facts.actuators for T in _grid(facts)]
 
     @property
     def expression(self) -> str:
@@ -74,7 +75,7 @@ class ActuatorDelay(AbstractActuator):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[ActuatorDelay]":
         """Each actuator with each delay of a grid."""
-        return [cls(name, tau) for name in facts.actuators for tau in _grid(facts)]
+        return [cls(name, number(tau)) for name in facts.actuators for tau in _grid(facts)]
 
     @property
     def expression(self) -> str:

@@ -1,4 +1,4 @@
-"""Hull effects: forces of the water on the body that a linear damping matrix leaves out."""
+"""Hull effects: forces of the water on the body, besides damping, that a linear model leaves out."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -9,89 +9,16 @@ import numpy as np
 from jaxtyping import Array
 
 from .base import AbstractForce, amplitude
-from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal
+from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
 
 WATER_DENSITY = 1025.0
-
-
-def _per(equation: str, *variables: str) -> str:
-    """The unit of a coefficient that makes a force of `equation` from a product of variables."""
-    lines, angles = EQUATIONS[:3], EQUATIONS[3:]
-    force = "N" if equation in lines else "N*m"
-    units = ["(m/s)" if v in lines else "(rad/s)" if v in angles else "rad" for v in variables]
-    return "/".join([force, *units]) if equation in EQUATIONS else "1"
-
-
-class _PowerDamping(AbstractForce):
-    """Drag on one equation that grows with a power of its own velocity."""
-
-    equation: eqx.AbstractVar[str]
-    coefficient: eqx.AbstractVar[Array]
-    power: eqx.AbstractClassVar[int]
-
-    @classmethod
-    def candidates(cls, facts: Facts) -> Sequence["_PowerDamping"]:
-        """One for each free equation."""
-        return [cls(equation) for equation in facts.equations]  # pyright: ignore[reportCallIssue]
-
-    @property
-    def where(self) -> tuple[str, ...]:
-        """The one equation."""
-        return (self.equation,)
-
-    @property
-    def expression(self) -> str:
-        """The drag term."""
-        velocity = VELOCITIES.get(self.equation, f"{self.equation}'")
-        growth = {2: f"|{velocity}| {velocity}", 3: f"{velocity}³"}[self.power]
-        return f"{self.symbols()['coefficient']} {growth}"
-
-    def symbols(self) -> dict[str, str]:
-        """SNAME symbol such as `K_pp`, `K_ppp`; `D2_roll`, `D3_roll` for a mechanism's coordinate."""
-        if self.equation in VELOCITIES:
-            return {"coefficient": f"{FORCES[self.equation]}_{VELOCITIES[self.equation] * self.power}"}
-        return {"coefficient": f"D{self.power}_{self.equation}"}
-
-    def units(self) -> dict[str, str]:
-        """Force per power of the velocity."""
-        return {"coefficient": _per(self.equation, *(self.equation,) * self.power)}
-
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """The drag along the motion."""
-        rate = motion.rates[self.equation]
-        return {self.equation: self.coefficient * abs(rate) ** (self.power - 1) * rate}
-
-
-class QuadraticDamping(_PowerDamping):
-    r"""Drag that grows with the square of one velocity: $\tau_i = c\,|\nu_i|\nu_i$, with $c \le 0$.
-
-    Source: Fossen, Handbook of Marine Craft Hydrodynamics (2021), §6.4.
-    """
-
-    name: ClassVar[str] = "quadratic-damping"
-    family: ClassVar[str] = "hull"
-    power: ClassVar[int] = 2
-    equation: str = eqx.field(static=True)
-    coefficient: Array = amplitude("1", sign=-1)
-
-
-class CubicDamping(_PowerDamping):
-    r"""Drag that grows with the cube of one velocity: $\tau_i = c\,\nu_i^3$, with $c \le 0$.
-
-    Source: ITTC 7.5-02-07-04.5 for roll; Abkowitz (1964) for the other equations.
-    """
-
-    name: ClassVar[str] = "cubic-damping"
-    family: ClassVar[str] = "hull"
-    power: ClassVar[int] = 3
-    equation: str = eqx.field(static=True)
-    coefficient: Array = amplitude("1", sign=-1)
 
 
 class CrossflowDrag(AbstractForce):
     r"""Strip-theory drag of the flow across the hull, which couples sway with yaw or heave with pitch.
 
-    $Y = -\tfrac12\rho D C_d \int_{-L/2}^{L/2} |v + xr|(v + xr)\,dx$ and $N = -\tfrac12\rho D C_d \int x\,|v + xr|(v + xr)\,dx$;
+    $Y = -\tfrac12\rho D C_d \int_{-L/2}^{L/2} |v + xr|(v + xr)\,dx$ and
+    $N = -\tfrac12\rho D C_d \int_{-L/2}^{L/2} x\,|v + xr|(v + xr)\,dx$;
     in the vertical plane with $w - xq$, $Z$ and $M$, the last with the opposite sign. $C_d \ge 0$.
     Source: Fossen (2021), §6.4.2; Healey and Lienard (1993).
     """
@@ -136,9 +63,10 @@ class CoriolisCoupling(AbstractForce):
     r"""Products of velocities from rigid body and added mass, beyond those that the linear model keeps.
 
     With $\tilde M = [M_{11}\,M_{12}; M_{21}\,M_{22}]$ and momentum $p = M_{11}\nu_1 + M_{12}\nu_2$,
-    $h = M_{21}\nu_1 + M_{22}\nu_2$, Kirchhoff gives $C(\nu)\nu = [\nu_2\times p;\; \nu_2\times h + \nu_1\times p]$. This is
-    a quadratic form, so what a linearisation about $(U_c, 0, …)$ leaves out is exactly $-k\,C(\delta\nu)\,\delta\nu$ with
-    $\delta\nu = \nu - (U_c, 0, …)$; physics gives $k = 1$. Source: Fossen (2021), theorem 3.2 and §6.3 (with the Munk moment).
+    $h = M_{21}\nu_1 + M_{22}\nu_2$, Kirchhoff gives $C(\nu)\nu = [\nu_2\times p;\; \nu_2\times h + \nu_1\times p]$.
+    This is a quadratic form, so what a linearisation about $(U_c, 0, …)$ leaves out is exactly
+    $-k\,C(\delta\nu)\,\delta\nu$ with $\delta\nu = \nu - (U_c, 0, …)$; physics gives $k = 1$.
+    Source: Fossen (2021), theorem 3.2 and §6.3 (with the Munk moment).
     """
 
     name: ClassVar[str] = "coriolis-coupling"
@@ -177,8 +105,8 @@ class CoriolisCoupling(AbstractForce):
 class TurningSpeedLoss(AbstractForce):
     r"""Surge resistance of manoeuvring: $X = X_{ab}\,a\,b$ for one pair of $v, r, w, q$ or a deflection.
 
-    Squares must not propel ($X_{vv}, X_{rr}, X_{ww}, X_{qq}, X_{\delta\delta} \le 0$); $X_{vr}$ and $X_{wq}$, centripetal
-    in kind, have either sign. Source: Abkowitz (1964); Norrbin (1971).
+    Squares must not propel ($X_{vv}, X_{rr}, X_{ww}, X_{qq}, X_{\delta\delta} \le 0$); $X_{vr}$ and $X_{wq}$,
+    centripetal in kind, have either sign. Source: Abkowitz (1964); Norrbin (1971).
     """
 
     name: ClassVar[str] = "turning-speed-loss"
@@ -210,7 +138,7 @@ class TurningSpeedLoss(AbstractForce):
 
     def units(self) -> dict[str, str]:
         """Force per product."""
-        return {"coefficient": _per("surge", self.first, self.second)}
+        return {"coefficient": unit_per("surge", self.first, self.second)}
 
     @property
     def expression(self) -> str:
@@ -227,7 +155,8 @@ class TurningSpeedLoss(AbstractForce):
 class SpeedScaling(AbstractForce):
     r"""Lift and rudder forces that grow with speed: $\tau_i = c\,(u - U_c)\,s$ for a velocity or deflection $s$.
 
-    A linear model has $Y_v v$ at $U_c$; lift has $Y_{uv}\,u\,v$. Source: Prestero (2001), §4.5-4.6; Fossen (2021), §9.6.
+    A linear model has $Y_v v$ at $U_c$; lift has $Y_{uv}\,u\,v$.
+    Source: Prestero (2001), §4.5-4.6; Fossen (2021), §9.6.
     """
 
     name: ClassVar[str] = "speed-scaling"
@@ -239,13 +168,13 @@ class SpeedScaling(AbstractForce):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SpeedScaling]":
         """Each lateral equation with the velocities and deflections of its own plane."""
-        planes = {
+        planes: dict[str, tuple[str, ...]] = {
             "sway": ("sway", "yaw"),
             "yaw": ("sway", "yaw"),
             "heave": ("heave", "pitch"),
             "pitch": ("heave", "pitch"),
+            "roll": ("roll",),
         }
-        planes["roll"] = ("roll",)
         if "surge" not in facts.equations:
             return []
         found = [cls(e, s) for e, plane in planes.items() for s in plane if {e, s} <= set(facts.equations)]
@@ -270,7 +199,7 @@ class SpeedScaling(AbstractForce):
 
     def units(self) -> dict[str, str]:
         """Force per product."""
-        return {"coefficient": _per(self.equation, "surge", self.with_)}
+        return {"coefficient": unit_per(self.equation, "surge", self.with_)}
 
     @property
     def expression(self) -> str:
@@ -310,7 +239,7 @@ class HullAsymmetry(AbstractForce):
 
     def units(self) -> dict[str, str]:
         """A force or a moment."""
-        return {"constant": _per(self.equation)}
+        return {"constant": unit_per(self.equation)}
 
     @property
     def expression(self) -> str:

@@ -88,11 +88,12 @@ class TrimOffset(AbstractForce):
         phi, theta = motion.positions["phi"], motion.positions["theta"]
         arm = self.offset * motion.buoyancy
         level, rolled, pitched = jnp.cos(phi) * jnp.cos(theta), jnp.sin(phi) * jnp.cos(theta), jnp.sin(theta)
-        return {
+        moments: dict[str, dict[str, Signal]] = {
             "x": {"pitch": arm * level, "yaw": -arm * rolled},
             "y": {"roll": -arm * level, "yaw": -arm * pitched},
             "z": {"roll": arm * rolled, "pitch": arm * pitched},
-        }[self.axis]
+        }
+        return moments[self.axis]
 
 
 class BuoyancyError(_ExtraBuoyancy):
@@ -144,8 +145,9 @@ class HullCompressibility(_ExtraBuoyancy):
 
 
 class DensityStratification(_ExtraBuoyancy):
-    r"""Water that grows denser with depth where no density was recorded: $\Delta B = B\,\gamma z$, $\gamma \ge 0$ in 1/m.
+    r"""Water that grows denser with depth where no density was recorded.
 
+    $\Delta B = B\,\gamma z$ with $\gamma \ge 0$ in 1/m.
     Compression of sea water alone is 4.5e-6 1/m; a stratified thermocline adds 1e-6 to 1e-4. Source: Gill (1982), §3.
     """
 

@@ -15,7 +15,8 @@ class CoulombFriction(AbstractForce):
     r"""Dry friction with an offset: $F = -F_c \tanh(\dot q / \dot q_s) - F_0$, $F_c \ge 0$.
 
     $\dot q_s$, a fiftieth of the rms rate, smooths the sign function so that the force has a derivative; $F_0$ is the
-    offset of a drive that needs more force one way than the other. Source: Olsson et al. (1998); Janot et al. (2019), EMPS.
+    offset of a drive that needs more force one way than the other.
+    Source: Olsson et al. (1998); Janot et al. (2019), EMPS.
     """
 
     name: ClassVar[str] = "coulomb-friction"
@@ -48,7 +49,10 @@ class CoulombFriction(AbstractForce):
 
 
 class CubicStiffness(AbstractForce):
-    r"""A spring that stiffens or softens: $F = -k_3 q^3$, of either sign. Source: Duffing (1918); Silverbox benchmark."""
+    r"""A spring that stiffens or softens: $F = -k_3 q^3$, of either sign.
+
+    Source: Duffing (1918); Silverbox benchmark.
+    """
 
     name: ClassVar[str] = "cubic-stiffness"
     family: ClassVar[str] = "mechanisms"

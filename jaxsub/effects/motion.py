@@ -11,13 +11,22 @@ EQUATIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 VELOCITIES: dict[str, str] = dict(zip(EQUATIONS, "uvwpqr", strict=True))
 FORCES: dict[str, str] = dict(zip(EQUATIONS, "XYZKMN", strict=True))
 GRAVITY = 9.80665
-CHANNEL_UNITS: dict[str, str] = (
-    dict.fromkeys(("u", "v", "w", "speed", "depth_rate"), "m/s")
-    | dict.fromkeys(("p", "q", "r", "heading_rate"), "rad/s")
-    | dict.fromkeys(("phi", "theta", "psi"), "rad")
-    | dict.fromkeys(("x", "y", "z", "depth"), "m")
-    | dict.fromkeys(("ax", "ay", "az"), "m/s/s")
-)
+_CHANNELS = {
+    "m/s": ("u", "v", "w", "speed", "depth_rate"),
+    "rad/s": ("p", "q", "r", "heading_rate"),
+    "rad": ("phi", "theta", "psi"),
+    "m": ("x", "y", "z", "depth"),
+    "m/s/s": ("ax", "ay", "az"),
+}
+CHANNEL_UNITS: dict[str, str] = {channel: unit for unit, channels in _CHANNELS.items() for channel in channels}
+
+
+def unit_per(equation: str, *variables: str) -> str:
+    """The unit of a coefficient that makes a force of `equation` from a product of variables."""
+    lines, angles = EQUATIONS[:3], EQUATIONS[3:]
+    force = "N" if equation in lines else "N*m"
+    units = ["(m/s)" if v in lines else "(rad/s)" if v in angles else "rad" for v in variables]
+    return "/".join([force, *units]) if equation in EQUATIONS else "1"
 
 
 class Motion(eqx.Module):

@@ -112,7 +112,11 @@ def search(
     """
     given = [output.sigma for output in vehicle.layout.outputs]
     estimated = jnp.array([s is None and sigma is None for s in given])
-    noise = jnp.asarray(sigma) if sigma is not None else jnp.where(estimated, _signal(runs), jnp.array([s or 1.0 for s in given]))
+    noise = (
+        jnp.asarray(sigma)
+        if sigma is not None
+        else jnp.where(estimated, _signal(runs), jnp.array([s or 1.0 for s in given]))
+    )
     problem = Problem.of(vehicle, runs, noise, start, moving=moving)
     y, total = problem.coordinates(), jnp.asarray(0)
     for _ in range(_CONCENTRATIONS):

@@ -1,8 +1,8 @@
 r"""What the recordings say about the coefficients: rank, and the directions in which they say nothing.
 
-With $I$ the Fisher information of the free coefficients and $D = \mathrm{diag}(|\theta_i|)$, the eigenvectors of $DID$ are
-relative changes of the coefficients taken together and its eigenvalues $\lambda$ how sharply the recordings tell them: a
-direction is known to $1/\sqrt\lambda$ of the coefficients' own sizes. Above 1 it is not known at all.
+With $I$ the Fisher information of the free coefficients and $D = \mathrm{diag}(|\theta_i|)$, the eigenvectors of $DID$
+are relative changes of the coefficients taken together and its eigenvalues $\lambda$ how sharply the recordings tell
+them: a direction is known to $1/\sqrt\lambda$ of the coefficients' own sizes. Above 1 it is not known at all.
 """
 
 import dataclasses

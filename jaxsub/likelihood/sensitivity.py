@@ -1,8 +1,8 @@
 r"""The model linearised along its trajectory, and the one recursion through which every question is asked.
 
 A coefficient, an initial state, a candidate effect and an unknown force differ only in how they force
-$D_{k+1} = A_k D_k + f_k$, so all of them go through it as columns of one batch. The Jacobians are exact derivatives of the
-sampled step; nothing here depends on how many effects the vocabulary has.
+$D_{k+1} = A_k D_k + f_k$, so all of them go through it as columns of one batch. The Jacobians are exact derivatives of
+the sampled step; nothing here depends on how many effects the vocabulary has.
 """
 
 from collections.abc import Callable

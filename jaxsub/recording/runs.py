@@ -56,6 +56,30 @@ class Runs(eqx.Module):
         taken["mask"] = taken["mask"] & real
         return dataclasses.replace(self, **taken)
 
+    def segments(self, count: int) -> "Runs":
+        """Every run cut into `count` pieces of equal length, each a run of its own that starts where the last ended.
+
+        A sample that two pieces share is measured in the later one.
+        """
+        samples = self.times.shape[1]
+        length = -(-(samples - 1) // count)
+        index = length * np.arange(count)[:, None] + np.arange(length + 1)
+        inside = np.minimum(index, samples - 1)
+        between = np.minimum(index[:, :-1], samples - 2)
+        cut = lambda array, at: array[:, at].reshape(-1, *at.shape[1:], *array.shape[2:])
+        owned = (np.arange(length + 1) < length) | (np.arange(count) == count - 1)[:, None]
+        owned = jnp.asarray(owned & (index < samples))
+        real = jnp.asarray(index[:, 1:] < samples)
+        return dataclasses.replace(
+            self,
+            times=cut(self.times, inside),
+            step_of=cut(self.step_of, between),
+            live=cut(self.live, between) & jnp.tile(real, (self.times.shape[0], 1)),
+            signals=cut(self.signals, inside),
+            outputs=cut(self.outputs, inside),
+            mask=cut(self.mask, inside) & jnp.tile(owned, (self.times.shape[0], 1))[..., None],
+        )
+
 
 def stack_runs(
     recordings: Sequence[Recording],

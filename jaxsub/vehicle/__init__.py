@@ -1,7 +1,8 @@
 """Vehicles: one model that simulation, likelihood, filters, diagnosis and controllers share."""
 
 from .base import AbstractVehicle, Layout, Output
-from .build import build, require_inertia
+from .build import build
+from .checks import require_inertia
 from .mechanism import Mechanism
 from .read import read_vehicle, vehicle_from
 from .submerged_body import SubmergedBody

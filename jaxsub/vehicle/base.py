@@ -2,14 +2,23 @@
 
 import abc
 import dataclasses
+from collections.abc import Mapping
 from typing import Self
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import AbstractActuator, AbstractEffect, AbstractForce, AbstractSensor, Motion
-from ..effects import parameter_table, with_numbers
+from ..effects import (
+    AbstractActuator,
+    AbstractEffect,
+    AbstractForce,
+    AbstractSensor,
+    Motion,
+    Signal,
+    parameter_table,
+    with_numbers,
+)
 from ..parameters import Parameter
 
 
@@ -71,10 +80,10 @@ class Layout:
 
 
 class AbstractVehicle(eqx.Module):
-    r"""Equations of motion $\tilde M\dot\nu = \tilde A\nu + \tau(\nu, \eta, \delta, t)$ with $\tau$ all that is not linear damping.
+    r"""Equations of motion $\tilde M\dot\nu = \tilde A\nu + \tau(\nu, \eta, \delta, t)$.
 
-    A state is [ν of the free equations, positions]; signals are the columns of inputs, prescribed motions and
-    surroundings in that order. All methods take any leading axes.
+    $\tau$ is all that is not linear damping. A state is [ν of the free equations, positions]; signals are the columns
+    of inputs, prescribed motions and surroundings in that order. All methods take any leading axes.
     """
 
     layout: eqx.AbstractVar[Layout]
@@ -101,15 +110,15 @@ class AbstractVehicle(eqx.Module):
         """The motion by name."""
 
     @abc.abstractmethod
-    def own_force(self, motion: Motion) -> dict[str, Array]:
+    def own_force(self, motion: Motion) -> dict[str, Signal]:
         """Generalised forces (N, N m) other than linear damping of the free equations and effects."""
 
     @abc.abstractmethod
-    def position_rates(self, motion: Motion) -> dict[str, Array]:
+    def position_rates(self, motion: Motion) -> dict[str, Signal]:
         """Rates of the position states."""
 
     @abc.abstractmethod
-    def channels(self, motion: Motion, acceleration: dict[str, Array]) -> dict[str, Array]:
+    def channels(self, motion: Motion, acceleration: Mapping[str, Signal]) -> dict[str, Signal]:
         """Every channel the vehicle can produce, before any sensor."""
 
     def values(self) -> dict[str, Array]:
@@ -176,14 +185,14 @@ class AbstractVehicle(eqx.Module):
         rates = self.acceleration(state, signals) if {"ax", "ay", "az"} & set(self.layout.channels) else None
         named = {} if rates is None else {e: rates[..., i] for i, e in enumerate(self.layout.equations)}
         true = self.channels(motion, named)
-        shown = {name: true[name] for name in self.layout.channels}
+        shown = {name: jnp.asarray(true[name]) for name in self.layout.channels}
         for effect in self.effects:
             if isinstance(effect, AbstractSensor):
                 shown[effect.channel] = effect.measure(times, shown[effect.channel])
         return stack(shown, self.layout.channels, times)
 
 
-def stack(named: dict[str, Array], order: tuple[str, ...], like: Array) -> Float[Array, "*k n"]:
+def stack(named: Mapping[str, Signal], order: tuple[str, ...], like: Signal) -> Float[Array, "*k n"]:
     """The named arrays as one, zero where absent, each broadcast to the shape of `like`."""
     if not order:
         return jnp.zeros((*like.shape, 0), like.dtype)

@@ -12,12 +12,8 @@ from .submerged_body import SubmergedBody
 
 _FORCES, _MOMENTS, _LINES, _TURNS = "XYZ", "KMN", "uvw", "pqr"
 _FINS = {"rudder": "delta_r", "elevator_right": "delta_er", "elevator_left": "delta_el"}
-_NOISE = (
-    dict.fromkeys("uvw", {"sigma": 0.01})
-    | dict.fromkeys("pqr", {"sigma": 0.0035})
-    | dict.fromkeys(("phi", "theta", "psi"), {"sigma": 0.005})
-    | {"z": {"sigma": 0.05}}
-)
+_SIGMAS = {("u", "v", "w"): 0.01, ("p", "q", "r"): 0.0035, ("phi", "theta", "psi"): 0.005, ("z",): 0.05}
+_NOISE = {channel: {"sigma": sigma} for channels, sigma in _SIGMAS.items() for channel in channels}
 
 
 def dimensional(prime: dict[str, float], length: float, speed: float, density: float) -> dict[str, float]:
@@ -86,6 +82,9 @@ def remus_100() -> SubmergedBody:
     (a stern rudder that pushes to starboard turns the bow to port), `K_pdot` as -0.0704, `M_uw` as 24.0, buoyancy as
     306 N, and roll damping as |p|p coefficient -0.13 linearised at 1 rad/s. The quadratic terms `Y_vv`, `Z_ww`,
     `M_qq`, `N_rr` on which copies disagree are left out: a linear model has none.
+
+    As published and linearised (restoring left out), sway-yaw and heave-pitch are unstable in open loop, with a
+    largest eigenvalue of about +1.0 1/s: errors grow e-fold every second, so free-running fits need short runs.
     """
     speed = 1.54
     values = {

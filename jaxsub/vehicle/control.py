@@ -1,9 +1,11 @@
 """Forces of control surfaces and propulsion."""
 
+from collections.abc import Mapping
+
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from ..effects import EQUATIONS
+from ..effects import EQUATIONS, Signal
 
 FIN_SYMBOLS = {
     "rudder": "delta_r",
@@ -28,9 +30,9 @@ class Control(eqx.Module):
 
     coefficients: dict[str, Float[Array, ""]]
 
-    def force(self, actuators: dict[str, Array]) -> dict[str, Array]:
+    def force(self, actuators: Mapping[str, Signal]) -> dict[str, Signal]:
         """Generalised force by equation for the deflections `actuators` (rad, N, rad/s), any leading axes."""
-        total: dict[str, Array] = {}
+        total: dict[str, Signal] = {}
         for name, value in self.coefficients.items():
             equation = EQUATIONS["XYZKMN".index(name[0])]
             total[equation] = total.get(equation, 0.0) + value * _regressor(name, actuators)
@@ -39,7 +41,7 @@ class Control(eqx.Module):
         return total
 
 
-def _regressor(name: str, actuators: dict[str, Array]) -> Array | float:
+def _regressor(name: str, actuators: Mapping[str, Signal]) -> Signal | float:
     """What the coefficient `name` multiplies."""
     symbol = name[2:]
     if symbol == "0":

@@ -9,7 +9,9 @@ _COLUMNS = dict(zip("uvwpqr", range(6), strict=True))
 
 
 class Damping(eqx.Module):
-    r"""$\tilde A$: the linear derivatives `X_u` … `N_r` and the two centripetal terms $-mU_c r$, $+mU_c q$ (equations.md §1).
+    r"""$\tilde A$ (equations.md §1): the linear derivatives `X_u` … `N_r` and the terms of going around.
+
+    Those are the centripetal $-mU_c r$ in sway and $+mU_c q$ in heave.
 
     **Fields**
 

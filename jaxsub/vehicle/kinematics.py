@@ -1,12 +1,14 @@
 """From body velocities to rates of attitude and position."""
 
+from collections.abc import Mapping
+
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from ..effects import Motion
+from ..effects import Motion, Signal
 
 
-def position_rates(motion: Motion) -> dict[str, Array]:
+def position_rates(motion: Motion) -> dict[str, Signal]:
     r"""Euler rates and velocity over ground (equations.md §1).
 
     $\dot\psi = (q\sin\phi + r\cos\phi)/\cos\theta$, $\dot\theta = q\cos\phi - r\sin\phi$,
@@ -28,7 +30,9 @@ def position_rates(motion: Motion) -> dict[str, Array]:
     }
 
 
-def specific_force(motion: Motion, acceleration: dict[str, Array], arm: tuple[float, float, float]) -> dict[str, Array]:
+def specific_force(
+    motion: Motion, acceleration: Mapping[str, Signal], arm: tuple[float, float, float]
+) -> dict[str, Array]:
     r"""What an accelerometer at `arm` (m from the centre of gravity, body axes) shows, m/s².
 
     $f = \dot\nu_1 + \nu_2\times\nu_1 + \dot\nu_2\times l + \nu_2\times(\nu_2\times l) - R^T g$.

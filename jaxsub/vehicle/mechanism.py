@@ -1,13 +1,14 @@
 """A mechanism of n coordinates: a rig, a roll decay, a servo."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Self
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import AbstractEffect, Motion
+from ..effects import AbstractEffect, Motion, Signal
 from ..parameters import number
 from .base import AbstractVehicle, Layout
 
@@ -47,15 +48,15 @@ class Mechanism(AbstractVehicle):
     def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:
         """Rates and positions by coordinate."""
         equations, n = self.layout.equations, len(self.layout.equations)
-        rates = {e: state[..., i] for i, e in enumerate(equations)}
-        positions = {e: state[..., n + i] for i, e in enumerate(equations)}
+        rates: dict[str, Signal] = {e: state[..., i] for i, e in enumerate(equations)}
+        positions: dict[str, Signal] = {e: state[..., n + i] for i, e in enumerate(equations)}
         columns = [name for name, _ in self.layout.inputs]
         environment = [name for name, _ in (*self.layout.prescribed, *self.layout.environment)]
-        actuators = {name: signals[..., i] for i, name in enumerate(columns)}
-        surroundings = {name: signals[..., len(columns) + i] for i, name in enumerate(environment)}
+        actuators: dict[str, Signal] = {name: signals[..., i] for i, name in enumerate(columns)}
+        surroundings: dict[str, Signal] = {name: signals[..., len(columns) + i] for i, name in enumerate(environment)}
         return Motion(rates, positions, actuators, surroundings, self.mass_matrix(), 0.0, 0.0)
 
-    def own_force(self, motion: Motion) -> dict[str, Array]:
+    def own_force(self, motion: Motion) -> dict[str, Signal]:
         """Springs, drives and constants."""
         stiffness, total = self._matrix("K"), {}
         for i, e in enumerate(self.layout.equations):
@@ -64,11 +65,11 @@ class Mechanism(AbstractVehicle):
             total[e] = self._value(f"F_{e}") - spring + drive
         return total
 
-    def position_rates(self, motion: Motion) -> dict[str, Array]:
+    def position_rates(self, motion: Motion) -> dict[str, Signal]:
         """The rates themselves."""
         return motion.rates
 
-    def channels(self, motion: Motion, acceleration: dict[str, Array]) -> dict[str, Array]:
+    def channels(self, motion: Motion, acceleration: Mapping[str, Signal]) -> dict[str, Signal]:
         """Each coordinate `q` and its rate `q_rate`."""
         return motion.positions | {f"{name}_rate": rate for name, rate in motion.rates.items()}
 

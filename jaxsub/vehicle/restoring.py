@@ -1,10 +1,12 @@
 """Weight and buoyancy."""
 
+from collections.abc import Mapping
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import GRAVITY
+from ..effects import GRAVITY, Signal
 
 STANDARD_DENSITY = 1025.0
 
@@ -21,14 +23,14 @@ class Restoring(eqx.Module):
     values: dict[str, Float[Array, ""]]
     reference_density: float = eqx.field(static=True, default=STANDARD_DENSITY)
 
-    def buoyancy(self, environment: dict[str, Array]) -> Array:
+    def buoyancy(self, environment: Mapping[str, Signal]) -> Array:
         r"""$B = B_0\,\rho/\rho_{ref} + \rho g V_{ballast}$ (N) for recorded `density` kg/m³ and `ballast` m³."""
         density = environment.get("density", self.reference_density)
         displaced = self.values["buoyancy"] * density / self.reference_density
         return displaced + density * GRAVITY * environment["ballast"] if "ballast" in environment else displaced
 
-    def force(self, phi: Array, theta: Array, buoyancy: Array) -> dict[str, Array]:
-        """Generalised force by equation at the attitude `phi`, `theta` (rad) with the displaced weight `buoyancy` (N)."""
+    def force(self, phi: Signal, theta: Signal, buoyancy: Array) -> dict[str, Array]:
+        """Generalised force by equation at the attitude `phi`, `theta` (rad) and displaced weight `buoyancy` (N)."""
         excess = self.values["weight"] - buoyancy
         x, y, z = (self.values[name] * buoyancy for name in ("x_B", "y_B", "z_B"))
         level, rolled, pitched = jnp.cos(phi) * jnp.cos(theta), jnp.sin(phi) * jnp.cos(theta), jnp.sin(theta)

@@ -151,8 +151,8 @@ def read_outputs(table: Table) -> tuple[Output, ...]:
         arm = entry.data.get("lever_arm", [0.0, 0.0, 0.0])
         if not isinstance(arm, list) or len(arm) != 3:
             raise InputError(entry.place("lever_arm"), f"is {arm!r}", "give three numbers in m")
-        arm = tuple(_finite(item, entry.place("lever_arm")) for item in arm)
-        outputs.append(Output(channel, None if sigma == "estimate" else sigma, arm))
+        x, y, z = (_finite(item, entry.place("lever_arm")) for item in arm)
+        outputs.append(Output(channel, None if sigma == "estimate" else sigma, (x, y, z)))
     if not outputs:
         raise InputError(f"{table.where}: outputs", "names no measured channel", "add [outputs.r] and the like")
     return tuple(outputs)

@@ -1,13 +1,14 @@
 """The submerged body of six degrees of freedom, or any of them."""
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Self
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion
+from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal
 from ..parameters import number
 from .base import AbstractVehicle, Layout
 from .control import Control
@@ -54,7 +55,10 @@ class SubmergedBody(AbstractVehicle):
 
     def with_own_values(self, values: dict[str, Array]) -> Self:
         """The same body with other numbers for those named."""
-        update = lambda named: {name: number(values.get(name, old)) for name, old in named.items()}
+
+        def update(named: dict[str, Array]) -> dict[str, Array]:
+            return {name: number(values.get(name, old)) for name, old in named.items()}
+
         return dataclasses.replace(
             self,
             inertia=Inertia(update(self.inertia.rigid), update(self.inertia.added)),
@@ -68,7 +72,7 @@ class SubmergedBody(AbstractVehicle):
         """The motion by name: free, prescribed or locked."""
         names = [f"input {n}" for n, _ in self.layout.inputs] + [n for n, _ in self.layout.prescribed]
         names += [f"environment {n}" for n, _ in self.layout.environment]
-        known = {name: signals[..., i] for i, name in enumerate(names)}
+        known: dict[str, Signal] = {name: signals[..., i] for i, name in enumerate(names)}
         pick = lambda kind: {n.removeprefix(kind): v for n, v in known.items() if n.startswith(kind)}
         order = [VELOCITIES[e] for e in self.layout.equations] + list(self.layout.positions)
         known |= {name: state[..., i] for i, name in enumerate(order)}
@@ -81,7 +85,7 @@ class SubmergedBody(AbstractVehicle):
         positions = {name: known.get(name, zero) for name in ("phi", "theta", "psi", "x", "y", "z")}
         return Motion(rates, positions, pick("input "), environment, self.inertia.matrix(), buoyancy, self.cruise)
 
-    def own_force(self, motion: Motion) -> dict[str, Array]:
+    def own_force(self, motion: Motion) -> dict[str, Signal]:
         """Control, restoring, and the damping of prescribed velocities."""
         total = self.control.force(motion.actuators)
         restoring = self.restoring.force(
@@ -96,11 +100,11 @@ class SubmergedBody(AbstractVehicle):
             total[equation] += sum(matrix[row, EQUATIONS.index(e)] * motion.rates[e] for e in moved)
         return total
 
-    def position_rates(self, motion: Motion) -> dict[str, Array]:
+    def position_rates(self, motion: Motion) -> dict[str, Signal]:
         """Euler rates and velocity over ground."""
         return position_rates(motion)
 
-    def channels(self, motion: Motion, acceleration: dict[str, Array]) -> dict[str, Array]:
+    def channels(self, motion: Motion, acceleration: Mapping[str, Signal]) -> dict[str, Signal]:
         """Velocities, attitude, position and what follows from them."""
         velocities = {VELOCITIES[e]: motion.rates[e] for e in EQUATIONS}
         rates = position_rates(motion)

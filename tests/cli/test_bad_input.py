@@ -111,7 +111,14 @@ def test_simulate_writes_a_recording_that_reads_back(tmp_path, monkeypatch):
     save(Recording("inputs", t, {"delta_s": 0.1 * np.sin(t)}, "test"), tmp_path / "inputs.csv")
     monkeypatch.setattr(
         "sys.argv",
-        ["jaxsub", "simulate", str(tmp_path / "vehicle.toml"), str(tmp_path / "inputs.csv"), "--out", str(tmp_path / "a.csv")],
+        [
+            "jaxsub",
+            "simulate",
+            str(tmp_path / "vehicle.toml"),
+            str(tmp_path / "inputs.csv"),
+            "--out",
+            str(tmp_path / "a.csv"),
+        ],
     )
     main()
     answer = load(tmp_path / "a.csv")

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.columns import Trajectory
@@ -20,8 +21,6 @@ from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import fit
 from jaxsub.vehicle import vehicle_from, vehicle_text
 from jaxsub.vehicle.catalogue import dsrv
-
-from diagnosis_cases import recorded, wrong
 
 
 class LayerForce(AbstractForce):
@@ -80,7 +79,7 @@ def test_nothing_concealed_is_none():
 
 
 def test_near_twins_are_ambiguous_with_their_rivals():
-    found, _ = run(HullAsymmetry("pitch", 300.0))
+    found, _ = run(HullAsymmetry("pitch", 4.0))
     names = {physics.effect for physics in found.physics}
     rivals = {rival.effect for physics in found.physics for rival in physics.rivals}
     assert found.verdict == "ambiguous"

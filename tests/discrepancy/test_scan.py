@@ -6,6 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from diagnosis_cases import recorded, wrong
 from scipy import stats
 
 from jaxsub.discrepancy import batch
@@ -15,8 +16,6 @@ from jaxsub.effects import candidates
 from jaxsub.effects.hull import CrossflowDrag
 from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import fit
-
-from diagnosis_cases import recorded, wrong
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +51,9 @@ def test_projection_matches_a_dense_regression(clean):
     dense = np.zeros((*start.shape[:3], runs * start.shape[3]))
     for r in range(runs):
         dense[r, ..., r * start.shape[3] : (r + 1) * start.shape[3]] = start[r]
-    J = np.concatenate([np.asarray(clean.model.theta) * weight, dense], -1).reshape(-1, clean.model.theta.shape[-1] + dense.shape[-1])
+    J = np.concatenate([np.asarray(clean.model.theta) * weight, dense], -1).reshape(
+        -1, clean.model.theta.shape[-1] + dense.shape[-1]
+    )
     # the initial states' priors, as extra rows
     prior = np.concatenate([np.zeros((dense.shape[-1], J.shape[1] - dense.shape[-1])), np.eye(dense.shape[-1])], 1)
     prior = prior / np.tile(np.asarray(clean.problem.spread), runs)[:, None]

@@ -1,0 +1,113 @@
+"""Refusing a vehicle that cannot be, with errors that say which of its names or numbers is at fault."""
+
+from collections.abc import Iterable
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..effects import CHANNEL_UNITS, EQUATIONS, VELOCITIES, AbstractActuator, AbstractForce, AbstractSensor
+from ..errors import InputError, nearest
+from .base import Layout
+from .control import ACTUATORS, needs
+from .inertia import indefinite
+from .mechanism import Mechanism
+from .schema import unknown_key
+from .submerged_body import SubmergedBody
+
+ENVIRONMENT = ("density", "ballast", "temperature")
+
+
+def require_inertia(vehicle: SubmergedBody | Mechanism, where: str) -> None:
+    """Raise `InputError` naming the coefficients where the inertia matrix is not positive definite."""
+    names = [n for n in vehicle.own_values() if n.endswith("dot") or n.startswith(("I_", "mass"))]
+    guilty = indefinite(np.asarray(vehicle.mass_matrix()), vehicle.layout.equations, names)
+    if guilty:
+        what = f"the inertia matrix is not positive definite because of {', '.join(guilty)}"
+        raise InputError(f"{where}: coefficients", what, "check their signs: added masses such as Y_vdot are negative")
+
+
+def check_names(layout: Layout, where: str) -> None:
+    """Refuse equations, actuators, prescribed motions and surroundings that a body does not have."""
+    motions = (*VELOCITIES.values(), "phi", "theta", "psi", "x", "y", "z")
+    for section, names, known in (
+        ("dof", layout.equations, EQUATIONS),
+        ("inputs", [n for n, _ in layout.inputs], ACTUATORS),
+        ("prescribed", [n for n, _ in layout.prescribed], motions),
+        ("environment", [n for n, _ in layout.environment], ENVIRONMENT),
+    ):
+        for name in names:
+            if name not in known:
+                raise unknown_key(f"{where}: {section}.{name}", tuple(known), name)
+    for name, _ in layout.prescribed:
+        equation = dict(zip(VELOCITIES.values(), EQUATIONS, strict=True)).get(name)
+        if equation in layout.equations:
+            raise InputError(
+                f"{where}: prescribed.{name}", f"{equation} is free", "leave it out of dof or of prescribed"
+            )
+
+
+def check_coefficients(
+    values: Iterable[str], known: set[str], layout: Layout, where: str, control: Iterable[str]
+) -> None:
+    """Refuse coefficients that a body does not have, and those of `control` that no actuator of it acts through."""
+    actuators = {actuator for actuator, _ in layout.inputs}
+    for name in values:
+        place = f"{where}: coefficients.{name}"
+        if name not in known:
+            raise unknown_key(place, _all_coefficients(), name)
+        ways = needs(name) if name in control else ()
+        if ways and not any(set(way) <= actuators for way in ways):
+            raise InputError(
+                place, f"acts through {' and '.join(ways[0])}", "name that actuator's column under [inputs]"
+            )
+
+
+def check_outputs(vehicle: SubmergedBody | Mechanism, where: str) -> None:
+    """Refuse channels that the vehicle does not produce."""
+    layout = vehicle.layout
+    own = (f for e in layout.equations for f in (e, f"{e}_rate"))
+    known = tuple(CHANNEL_UNITS) if isinstance(vehicle, SubmergedBody) else tuple(own)
+    for channel in layout.channels:
+        if channel not in known:
+            raise unknown_key(f"{where}: outputs.{channel}", known, channel)
+
+
+def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
+    """Refuse effects on what the vehicle lacks, and one that is there twice."""
+    layout = vehicle.layout
+    labels = [effect.label for effect in vehicle.effects]
+    for index, effect in enumerate(vehicle.effects):
+        place = f"{where}: effects[{index + 1}] ({effect.name})"
+        if labels.index(effect.label) < index:
+            raise InputError(place, f"{effect.label} is there twice", "delete one")
+        if isinstance(effect, AbstractForce):
+            _check_force(effect, vehicle, place)
+        if isinstance(effect, AbstractActuator) and effect.actuator not in dict(layout.inputs):
+            hint = nearest(effect.actuator, [n for n, _ in layout.inputs]) or "an actuator of [inputs]"
+            raise InputError(place, f"no actuator {effect.actuator}", f"use {hint}")
+        if isinstance(effect, AbstractSensor) and effect.channel not in layout.channels:
+            hint = nearest(effect.channel, list(layout.channels)) or "a channel of [outputs]"
+            raise InputError(place, f"no channel {effect.channel}", f"use {hint}")
+
+
+def _check_force(effect: AbstractForce, vehicle: SubmergedBody | Mechanism, place: str) -> None:
+    """Refuse a force that the vehicle's motion cannot make, or that no free equation feels."""
+    layout = vehicle.layout
+    state = jnp.zeros(len(layout.equations) + len(layout.positions))
+    motion = vehicle.motion(state, jnp.zeros(len(layout.held) + len(layout.interpolated)))
+    try:
+        felt = set(effect.force(motion)) & set(layout.equations)
+    except KeyError as error:  # it looks for a motion, an actuator or a recorded column by its name
+        known = (*layout.equations, *dict(layout.inputs), *dict(layout.environment))
+        raise unknown_key(f"{place}: {error.args[0]}", known, str(error.args[0])) from error
+    if not felt:
+        raise InputError(
+            place, f"acts on {', '.join(effect.where)}", f"free that in dof: {', '.join(layout.equations)}"
+        )
+
+
+def _all_coefficients() -> tuple[str, ...]:
+    letters, velocities = "XYZKMN", "uvwpqr"
+    fins = ("0", "delta_r", "delta_er", "delta_el", "delta_e", "delta_s")
+    names = [f"{f}_{v}{dot}" for f in letters for v in velocities for dot in ("", "dot")]
+    return (*names, *(f"{f}_{fin}" for f in letters for fin in fins), "X_nn")
