@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxsub.cli.demo import inputs
 from jaxsub.effects.hull import CrossflowDrag
+from jaxsub.parameters import number
 from jaxsub.recording import Recording, save
 from jaxsub.simulate.synthetic import sampled_states, synthetic
 from jaxsub.vehicle import AbstractVehicle, write_vehicle
@@ -26,7 +27,9 @@ def recordings_and_vehicle() -> tuple[AbstractVehicle, list[Recording]]:
     vehicle = dataclasses.replace(vehicle, layout=dataclasses.replace(vehicle.layout, parameters=rows))
     assert len(vehicle.layout.free) == 31
     driven = [inputs(number, rng) for number in range(3)]
-    truth = vehicle.with_effect(CrossflowDrag("horizontal", vehicle.layout.length, vehicle.layout.diameter, 0.7))
+    truth = vehicle.with_effect(
+        CrossflowDrag("horizontal", vehicle.layout.length, vehicle.layout.diameter, number(0.7))
+    )
     recorded = synthetic(truth, driven, seed=11, states=sampled_states)
     values = vehicle.values()
     fitted = [row.name for row in vehicle.layout.free if row.name not in _ADDED]

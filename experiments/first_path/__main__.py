@@ -31,11 +31,11 @@ def judge(folder: Path, vehicle: str = "vehicle.toml") -> Diagnosis:
     return diagnosis
 
 
-def case(seed: int, concealed: str | AbstractEffect | None, *, again: bool = False) -> dict:
-    """One concealed effect (`demo`'s own choice for "demo", None for none), diagnosed from files."""
+def case(seed: int, *concealed: AbstractEffect | None, again: bool = False) -> dict:
+    """One concealed effect (the demo's own choice for `seed` where none is given, None for none), diagnosed from files."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        effect = make_files(folder, seed) if concealed == "demo" else make_files(folder, seed, concealed)
+        effect = make_files(folder, seed, *concealed)
         begin = time.perf_counter()
         found = judge(folder)
         line = {
@@ -75,7 +75,7 @@ def main() -> None:
     chosen = parser.parse_args()
     session.start()
     seeds = range(2 if chosen.quick else 10)
-    demo = [case(seed, "demo", again=seed < 3) for seed in seeds]
+    demo = [case(seed, again=seed < 3) for seed in seeds]
     clean = [case(100 + seed, None) for seed in range(2 if chosen.quick else 20)]
     outside = [case(200 + i, effect) for i, effect in enumerate(OUTSIDE[: 1 if chosen.quick else None])]
     results = {

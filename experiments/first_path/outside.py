@@ -9,6 +9,7 @@ from jaxtyping import Array
 
 from jaxsub.effects import AbstractForce, Facts, Motion
 from jaxsub.effects.base import amplitude
+from jaxsub.parameters import number
 
 
 class HeadingForce(AbstractForce):
@@ -70,9 +71,9 @@ class DepthForce(AbstractForce):
 
 
 OUTSIDE = (
-    HeadingForce("yaw", 4.0, 60.0),
-    HeadingForce("sway", 6.0, 60.0),
-    HeadingForce("roll", 3.0, 40.0),
-    DepthForce("heave", 2.5, 25.0),
-    DepthForce("pitch", 3.0, 25.0),
+    HeadingForce("yaw", 4.0, number(60.0)),
+    HeadingForce("sway", 6.0, number(60.0)),
+    HeadingForce("roll", 3.0, number(40.0)),
+    DepthForce("heave", 2.5, number(25.0)),
+    DepthForce("pitch", 3.0, number(25.0)),
 )

@@ -9,6 +9,7 @@ from ..effects.actuators import ActuatorLag
 from ..effects.hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, TurningSpeedLoss
 from ..effects.hydrostatics import TrimOffset
 from ..effects.sensors import SensorBias, SensorScale
+from ..parameters import number
 from ..recording import Recording, save
 from ..simulate.manoeuvres import prbs
 from ..simulate.synthetic import sampled_states, synthetic
@@ -25,16 +26,17 @@ _WRONG = 0.2
 def concealable(vehicle: AbstractVehicle) -> list[AbstractEffect]:
     """Effects large enough to matter to an operator, and different enough to be told apart in these runs."""
     layout = vehicle.layout
-    return [
-        CrossflowDrag("horizontal", layout.length, layout.diameter, 0.7),
-        ActuatorLag("rudder", 0.6),
-        SensorScale("r", 0.06),
-        CoriolisCoupling(layout.equations, 1.0),
-        TurningSpeedLoss("yaw", "yaw", -6000.0),
-        SensorBias("q", 0.0012),
-        HullAsymmetry("yaw", 12.0),
-        TrimOffset("z", 0.03),
+    effects: list[AbstractEffect] = [
+        CrossflowDrag("horizontal", layout.length, layout.diameter, number(0.7)),
+        ActuatorLag("rudder", number(0.6)),
+        SensorScale("r", number(0.06)),
+        CoriolisCoupling(layout.equations, number(1.0)),
+        TurningSpeedLoss("yaw", "yaw", number(-6000.0)),
+        SensorBias("q", number(0.0012)),
+        HullAsymmetry("yaw", number(12.0)),
+        TrimOffset("z", number(0.03)),
     ]
+    return effects
 
 
 def run(out: Path, seed: int, overwrite: bool) -> None:

@@ -20,7 +20,7 @@ def start() -> None:
     jax.config.update("jax_enable_x64", True)
     folder = Path(platformdirs.user_cache_dir("jaxsub")) / f"jax-{jax.__version__}"
     jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 
 

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from ..effects import VELOCITIES, AbstractActuator, AbstractEffect, AbstractSensor, Motion, candidates
+from ..effects import VELOCITIES, AbstractEffect, AbstractForce, Motion, candidates
 from ..effects.actuators import ActuatorLag
 from ..effects.sensors import SensorBias, SensorDrift, SensorScale
 from ..estimate import Fit
@@ -181,17 +181,18 @@ def effect_share(fit: Fit, path: Trajectory, effects: Sequence[AbstractEffect]) 
     """How the trace of accepted effects in the outputs divides among the equations, actuators and sensors they act on."""
     squares: dict[str, float] = {}
     for effect in effects:
-        columns, _ = candidate_columns(fit, path, [effect])
-        if isinstance(effect, AbstractActuator | AbstractSensor):
-            squares[effect.where[0]] = squares.get(effect.where[0], 0.0) + _squares(fit, columns)
-            continue
-        for equation, part in _by_equation(fit, path, effect).items():
-            squares[equation] = squares.get(equation, 0.0) + part
+        if isinstance(effect, AbstractForce):
+            parts = _by_equation(fit, path, effect)
+        else:
+            columns, _ = candidate_columns(fit, path, [effect])
+            parts = {effect.where[0]: float(jnp.sum(project(fit, columns)[0] ** 2))}
+        for place, part in parts.items():
+            squares[place] = squares.get(place, 0.0) + part
     total = max(sum(squares.values()), 1e-300)
     return {place: part / total for place, part in squares.items()}
 
 
-def _by_equation(fit: Fit, path: Trajectory, effect: AbstractEffect) -> dict[str, float]:
+def _by_equation(fit: Fit, path: Trajectory, effect: AbstractForce) -> dict[str, float]:
     """Squares of what an effect's force in each equation alone does to the outputs beyond what coefficients absorb."""
     ends = np.stack([stacked_force(fit.vehicle, effect, motion) for motion in (path.start, path.end)])
     equations = fit.vehicle.layout.equations
@@ -200,7 +201,3 @@ def _by_equation(fit: Fit, path: Trajectory, effect: AbstractEffect) -> dict[str
     projected, _, _ = project(fit, columns)
     parts = np.sum(np.asarray(projected) ** 2, axis=(0, 1, 2))
     return dict(zip(equations, parts.tolist(), strict=True))
-
-
-def _squares(fit: Fit, columns: Array) -> float:
-    return float(jnp.sum(project(fit, columns)[0] ** 2))

@@ -51,6 +51,8 @@ class Sampled(eqx.Module):
         full = nodes if extra is None else jnp.concatenate([nodes, extra], axis=1)
         weights = self.table.at(index)
 
+        # compiled apart so that the four stages of a step, and their derivatives, are traced once and not four times
+        @jax.jit
         def rates(velocity: Array, position: Array, node: Array) -> tuple[Array, Array]:
             signals, force = (node, 0.0) if extra is None else (node[:-n], node[-n:])
             motion = self.vehicle.motion(jnp.concatenate([velocity, position]), signals)
