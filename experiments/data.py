@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def data_folder(name: str) -> Path:
-    """The folder of a data set, in `$JAXSUB_DATA` or `../shared/data`; ends the program with a word where there is none."""
+    """The folder of a data set, in `$JAXSUB_DATA` or `../shared/data`; ends the program where there is none."""
     places = [Path(p) for p in (os.environ.get("JAXSUB_DATA"), "../shared/data") if p]
     for place in places:
         if (place / name).is_dir():

@@ -1,8 +1,8 @@
 """`python -m experiments.benchmarks --out DIR [--quick]`: what a score pass and a whole diagnosis take.
 
 `score_pass`: a pass over 200 candidates against a Gauss-Newton step on the same fit, its first call (compilation
-included) against the number of candidates. `diagnose`: the command on three runs of 800 samples, 10 channels and 31 free
-coefficients, in its own process, with an empty compilation cache and again with a full one.
+included) against the number of candidates. `diagnose`: the command on three runs of 800 samples, 10 channels and 31
+free coefficients, in its own process, with an empty compilation cache and again with a full one.
 """
 
 import argparse

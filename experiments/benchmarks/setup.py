@@ -1,4 +1,4 @@
-"""The case that the benchmarks share: NPS AUV II, three runs, ten channels, 31 free coefficients, a concealed effect."""
+"""The benchmarks' case: NPS AUV II, three runs, ten channels, 31 free coefficients, a concealed effect."""
 
 import dataclasses
 from pathlib import Path

@@ -32,7 +32,7 @@ def judge(folder: Path, vehicle: str = "vehicle.toml") -> Diagnosis:
 
 
 def case(seed: int, *concealed: AbstractEffect | None, again: bool = False) -> dict:
-    """One concealed effect (the demo's own choice for `seed` where none is given, None for none), diagnosed from files."""
+    """One concealed effect (the demo's choice for `seed` where none is given, None for none), diagnosed from files."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         effect = make_files(folder, seed, *concealed)

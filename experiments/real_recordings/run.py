@@ -13,7 +13,7 @@ from jaxsub.vehicle import read_vehicle
 def diagnose_files(
     vehicle_text: str, train: Sequence[Recording], held: Sequence[Recording], folder: Path
 ) -> tuple[Diagnosis, dict[str, dict[str, float]]]:
-    """The diagnosis, written into `folder` beside the vehicle file; and held-out rms by channel (SI) after each effect."""
+    """The diagnosis, written into `folder` beside the vehicle file; held-out rms by channel (SI) after each effect."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "vehicle.toml").write_text(vehicle_text, encoding="utf-8")
     shutil.rmtree(folder / "figures", ignore_errors=True)

@@ -12,15 +12,18 @@ _RUNS = {
         "delay does not"
     ),
     frozenset({"quadratic-damping", "cubic-damping", "crossflow-drag"}): (
-        "the same manoeuvre at a third and at three times the amplitude, and one with sway and yaw (or heave and pitch) in "
+        "the same manoeuvre at a third and at three times the amplitude, and one with sway and yaw (or "
+        "heave and pitch) in "
         "another ratio, such as a pull-out instead of a zigzag"
     ),
     frozenset({"hull-compressibility", "density-stratification", "thermal-expansion", "buoyancy-error"}): (
-        "the same dive with recorded density and temperature, or in well-mixed water: the hull's share follows pressure, the "
+        "the same dive with recorded density and temperature, or in well-mixed water: the hull's share "
+        "follows pressure, the "
         "water's follows density"
     ),
     frozenset({"sensor-bias", "sensor-scale", "sensor-drift"}): (
-        "a minute at rest before and after a run: a bias shows at rest, a scale does not, a drift differs between the two"
+        "a minute at rest before and after a run: a bias shows at rest, a scale does not, a drift "
+        "differs between the two"
     ),
 }
 

@@ -45,10 +45,10 @@ def diagnose(
     vocabulary: tuple[type[AbstractEffect], ...] = VOCABULARY,
     progress: Progress = lambda message: None,
 ) -> tuple[Diagnosis, AbstractVehicle]:
-    """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `held`; and the improved vehicle.
+    """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `held`.
 
-    `progress` is told what is being done. **Raises** `InputError` where the recordings lack a column, or the model
-    does not run from the vehicle file's values.
+    Returns the diagnosis and the improved vehicle; `progress` is told what is being done. **Raises** `InputError`
+    where the recordings lack a column, or the model does not run from the vehicle file's values.
     """
     layout = vehicle.layout
     runs = batch(vehicle, [*train, *held])
@@ -147,7 +147,7 @@ def judge(baseline: Fit, naming: Naming, held_out: Sequence[HeldOut]) -> Judged:
 
 
 def mirrored(naming: Naming, step: Step) -> list[str]:
-    """Effects that leave the trace of the accepted one with the opposite sign: only the difference of the two is told."""
+    """Effects with the trace of the accepted one and the opposite sign: only the difference of the two is told."""
     scored = {candidate.label: candidate for candidate in naming.candidates}
     accepted = scored.get(step.label)
     if accepted is None:
@@ -163,7 +163,7 @@ def mirrored(naming: Naming, step: Step) -> list[str]:
 
 
 def explained(baseline: Fit, improved: Fit) -> float:
-    """The share of the baseline's squared residuals above the recordings' own white noise that the improvement removes."""
+    """The share of the baseline's squared residuals above the recordings' white noise that the improvement removes."""
     mask, samples = np.asarray(baseline.runs.mask), np.asarray(baseline.runs.samples())
     sigma = np.asarray(improved.sigma)
     noise = record_sigma(np.asarray(improved.model.error), mask)

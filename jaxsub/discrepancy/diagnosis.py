@@ -84,7 +84,7 @@ class ForceTrace:
 
 @dataclasses.dataclass(frozen=True)
 class Overlay:
-    """Measured and free-running modelled outputs of one run that the fit did not see, by channel, SI; NaN is missing."""
+    """Measured and free-running modelled outputs of one run that no fit saw, by channel, SI; NaN is missing."""
 
     run: str
     times: np.ndarray
@@ -136,9 +136,10 @@ class RunQuality:
 class Diagnosis:
     """The answer to "what physics was left out", with all that shows it.
 
-    `history` is (`baseline` or the label of the effect accepted next, held-out rms error by channel in SI). `fit` maps `train` and `held_out` to `baseline` and `improved` to rms(residual)/σ by channel. `p_value` is that of
-    the whole mismatch, corrected for everything tried. `summary` is the verdict in one sentence, `notes` what a reader
-    must know besides.
+    `history` is (`baseline` or the label of the effect accepted next, held-out rms error by channel in SI). `fit`
+    maps `train` and `held_out` to `baseline` and `improved` to rms(residual)/σ by channel. `p_value` is that of
+    the whole mismatch, corrected for everything tried. `summary` is the verdict in one sentence, `notes` what a
+    reader must know besides.
     """
 
     verdict: Verdict

@@ -164,7 +164,7 @@ def grows_with(fit: Fit, path: Trajectory, equation: str, most: int = 3) -> list
 
 
 def motion_variables(motion: Motion) -> dict[str, np.ndarray]:
-    """What a force may grow with: velocities, positions, inputs, their sizes, and products that drag laws use, (R, K-1)."""
+    """What a force may grow with: velocities, positions, inputs, their sizes and products, each (R, K-1)."""
     rates = {VELOCITIES.get(e, f"{e}_rate"): np.asarray(v) for e, v in motion.rates.items()}
     others = {k: np.asarray(v) for k, v in (motion.positions | motion.actuators | motion.environment).items()}
     moving = {k: v for k, v in (rates | others).items() if np.ndim(v) == 2 and np.std(v) > 1e-9}
@@ -178,7 +178,7 @@ def motion_variables(motion: Motion) -> dict[str, np.ndarray]:
 
 
 def effect_share(fit: Fit, path: Trajectory, effects: Sequence[AbstractEffect]) -> dict[str, float]:
-    """How the trace of accepted effects in the outputs divides among the equations, actuators and sensors they act on."""
+    """How the trace of accepted effects divides among the equations, actuators and sensors they act on."""
     squares: dict[str, float] = {}
     for effect in effects:
         if isinstance(effect, AbstractForce):

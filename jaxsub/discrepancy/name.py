@@ -1,8 +1,8 @@
 r"""Which physics was left out: scan, refit the strongest, weigh them against each other, accept, scan again.
 
 A refitted explanation e with k_e parameters has quasi-likelihood weight
-$\exp[-\tfrac12(\chi^2_e/\kappa + k_e\ln N)]$: the Bayesian information criterion, with χ² divided by the inflation κ that
-coloured residuals cause (Burnham and Anderson 2002, §2.5). Weights of all forms of one effect add up.
+$\exp[-\tfrac12(\chi^2_e/\kappa + k_e\ln N)]$: the Bayesian information criterion, with χ² divided by the inflation κ
+that coloured residuals cause (Burnham and Anderson 2002, §2.5). Weights of all forms of one effect add up.
 """
 
 import dataclasses
@@ -75,7 +75,7 @@ def name(
 
 
 def viewpoint(baseline: Fit, start: AbstractVehicle) -> Fit:
-    """The fit that the first scan looks from: the baseline, or where it misses grossly, a fit to short pieces of the runs.
+    """The fit that the first scan looks from: the baseline, or where it misses grossly, a fit to short pieces.
 
     Coefficients that had to make up for a large missing force over a whole run are far from the truth, and so is
     everything linearised about them. Over short pieces, each with its own initial state, the missing force has no time

@@ -32,7 +32,7 @@ class Explanation:
 
 
 def contenders(scores: Sequence[Score]) -> list[Score]:
-    """The candidates worth a refit: significant, of admissible sign, the best of their label, near enough to the best."""
+    """The candidates worth a refit: significant, of admissible sign, best of their label, near enough to the best."""
     best: dict[str, Score] = {}
     for score in scores:
         if score.admissible and score.p_value < SIGNIFICANCE and score.effect.label not in best:
@@ -47,7 +47,7 @@ def contenders(scores: Sequence[Score]) -> list[Score]:
 def refit_all(
     fit: Fit, view: Fit, path: Trajectory, scores: Sequence[Score], progress: Callable[[str], None]
 ) -> list[Explanation]:
-    """The contenders among `scores` joined to the model and fitted to the runs of `fit`, from the coefficients of `view`.
+    """The contenders among `scores`, each in the model, fitted to the runs of `fit` from the coefficients of `view`.
 
     Two at a time, since compiling leaves the other core idle.
     """

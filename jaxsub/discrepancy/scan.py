@@ -1,8 +1,8 @@
 r"""The score scan: how much of the residual each candidate would explain that the coefficients cannot.
 
 With whitened residuals r, the Jacobian J of the free coefficients and initial states, and a candidate's columns S,
-$S_\perp = S - J(J^TJ)^{-1}J^TS$; then $b^TG^{-1}b$ with $b = S_\perp^Tr$, $G = S_\perp^TS_\perp$ is χ² under "nothing left
-out", $G^{-1}b$ predicts the amplitudes, and $|S_\perp|^2/|S|^2$ is what the coefficients leave of the trace.
+$S_\perp = S - J(J^TJ)^{-1}J^TS$; then $b^TG^{-1}b$ with $b = S_\perp^Tr$, $G = S_\perp^TS_\perp$ is χ² under "nothing
+left out", $G^{-1}b$ predicts the amplitudes, and $|S_\perp|^2/|S|^2$ is what the coefficients leave of the trace.
 Source: Rao's score test; design.md.
 """
 
@@ -43,7 +43,7 @@ class Score:
 
 
 def project(fit: Fit, columns: Float[Array, "r k c q"]) -> tuple[Array, Array, Array]:
-    """Whitened columns with the coefficients and initial states projected off, their squares before, and the residual."""
+    """Whitened columns less what coefficients and initial states absorb, their squares before, and the residual."""
     return _project(fit.model, fit.problem, columns)
 
 
@@ -104,7 +104,7 @@ def scan(fit: Fit, candidates: Sequence[AbstractEffect], path: Trajectory) -> li
 
 
 def _score(effect: AbstractEffect, b: np.ndarray, G: np.ndarray, before: np.ndarray, tried: int) -> Score:
-    """The score from sums over blocks: `b` (B, q) of S·r, `G` (B, q, q) of S·S; `before` (q,) the unprojected squares."""
+    """The score from sums over blocks: `b` (B, q) of S·r, `G` (B, q, q) of S·S; `before` (q,) unprojected squares."""
     total, after = G.sum(0), np.diag(G.sum(0))
     kept = float(np.min(after / np.maximum(before, 1e-300)))
     if not np.all(np.isfinite(total)) or kept < ABSORBED:

@@ -82,7 +82,7 @@ def _search(problem: Problem, y: Array) -> tuple[Array, Array, Array, RESULTS]:
     """Coordinates of the optimum from the start `y`, its cost, the steps taken and what became of it."""
     solution = optx.least_squares(
         lambda y, problem: problem.residuals(y),
-        # a cost that settles to 0.004 is under a hundredth of what one standard error costs; `Fit.gradient_norm` checks it
+        # a cost that settles to 0.004 is under a hundredth of what a standard error costs; `Fit.gradient_norm` checks
         optx.LevenbergMarquardt(rtol=1e-7, atol=0.004, norm=optx.rms_norm),
         y,
         args=problem,

@@ -1,4 +1,4 @@
-"""A small vehicle with two equations, recorded with and without a concealed effect: fast enough to diagnose in a test."""
+"""A small vehicle, recorded with and without a concealed effect: fast enough to diagnose in a test."""
 
 from functools import cache
 

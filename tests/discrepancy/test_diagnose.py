@@ -1,4 +1,4 @@
-"""Diagnosis names what was concealed and shows it on unseen runs, is silent on clean ones, and says when it does not know."""
+"""Diagnosis names what was concealed, shows it on unseen runs, is silent on clean ones, and admits ignorance."""
 
 import dataclasses
 import json
