@@ -79,7 +79,7 @@ def test_nothing_concealed_is_none():
 
 
 def test_near_twins_are_ambiguous_with_their_rivals():
-    found, _ = run(HullAsymmetry("pitch", 4.0))
+    found, _ = run(HullAsymmetry("pitch", 0.6))
     names = {physics.effect for physics in found.physics}
     rivals = {rival.effect for physics in found.physics for rival in physics.rivals}
     assert found.verdict == "ambiguous"
