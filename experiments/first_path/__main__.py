@@ -7,28 +7,31 @@ vocabulary has. `again`: `diagnose` on its own `improved.toml`.
 
 import argparse
 import json
+import subprocess
+import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from scipy import stats
 
 from jaxsub.cli import session
 from jaxsub.cli.demo import make_files
-from jaxsub.discrepancy import Diagnosis, diagnose
 from jaxsub.effects import AbstractEffect
-from jaxsub.recording import load
-from jaxsub.vehicle import read_vehicle, write_vehicle
 
 from .outside import OUTSIDE
 
+_JAXSUB = (sys.executable, "-c", "from jaxsub.cli import main; main()")
+_CLEAN, _AGAIN = 16, 3
 
-def judge(folder: Path, vehicle: str = "vehicle.toml") -> Diagnosis:
-    """The diagnosis of the files in `folder`; writes `improved.toml` there."""
-    runs = [load(path) for path in sorted(folder.glob("run*.csv"))]
-    diagnosis, improved = diagnose(read_vehicle(folder / vehicle), runs[:-1], runs[-1:])
-    write_vehicle(improved, folder / "improved.toml")
-    return diagnosis
+
+def judge(folder: Path, vehicle: str = "vehicle.toml", out: str = "out") -> dict:
+    """The contents of `diagnosis.json` for the files in `folder`, by the command line in a process of its own."""
+    runs = sorted(str(path) for path in folder.glob("run*.csv"))
+    command = [*_JAXSUB, "diagnose", str(folder / vehicle), *runs, "--out", str(folder / out)]
+    subprocess.run(command, check=True, capture_output=True)
+    return json.loads((folder / out / "diagnosis.json").read_text(encoding="utf-8"))
 
 
 def case(seed: int, *concealed: AbstractEffect | None, again: bool = False) -> dict:
@@ -38,26 +41,27 @@ def case(seed: int, *concealed: AbstractEffect | None, again: bool = False) -> d
         effect = make_files(folder, seed, *concealed)
         begin = time.perf_counter()
         found = judge(folder)
+        where = [place["equation"] for place in found["mismatch"]["where"]]
+        names = [physics["effect"] for physics in found["physics"]]
         line = {
             "seed": seed,
             "concealed": None if effect is None else effect.label,
-            "verdict": found.verdict,
-            "named": [physics.label for physics in found.physics],
-            "rivals": [rival.effect for physics in found.physics for rival in physics.rivals],
-            "probability": [physics.probability for physics in found.physics],
-            "first_place": found.where[0].where if found.where else None,
-            "held_out": found.fit["held_out"],
-            "p_value": found.p_value,
+            "verdict": found["verdict"],
+            "named": names,
+            "rivals": [rival["effect"] for physics in found["physics"] for rival in physics["rivals"]],
+            "probability": [physics["probability"] for physics in found["physics"]],
+            "first_place": where[0] if where else None,
+            "held_out": found["fit"]["held_out"],
+            "p_value": found["mismatch"]["p_value"],
             "seconds": time.perf_counter() - begin,
         }
         if effect is not None:
-            line["right"] = [physics.effect for physics in found.physics] == [effect.name]
-            line["located"] = bool(found.where) and found.where[0].where in effect.where
+            line["right"] = found["verdict"] == "named" and names == [effect.name]
+            line["located"] = bool(where) and where[0] in effect.where
         if again:
-            line["again"] = judge(folder, "improved.toml").verdict
-    session.console.print(
-        f"{line['concealed']}: {line['verdict']} {line['named']} {line['seconds']:.0f} s", highlight=False
-    )
+            improved = folder / "out" / "improved.toml"
+            line["again"] = judge(folder, str(improved.relative_to(folder)), "again")["verdict"]
+    session.console.print(f"{line['concealed']}: {line['verdict']} {names} {line['seconds']:.0f} s", highlight=False)
     return line
 
 
@@ -74,10 +78,12 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a few of each")
     chosen = parser.parse_args()
     session.start()
-    seeds = range(2 if chosen.quick else 10)
-    demo = [case(seed, again=seed < 3) for seed in seeds]
-    clean = [case(100 + seed, None) for seed in range(2 if chosen.quick else 20)]
-    outside = [case(200 + i, effect) for i, effect in enumerate(OUTSIDE[: 1 if chosen.quick else None])]
+    quick = chosen.quick
+    with ThreadPoolExecutor(2) as pool:
+        demo_cases = [pool.submit(case, seed, again=seed < _AGAIN) for seed in range(2 if quick else 10)]
+        clean_cases = [pool.submit(case, 100 + seed, None) for seed in range(2 if quick else _CLEAN)]
+        outside_cases = [pool.submit(case, 200 + i, e) for i, e in enumerate(OUTSIDE[: 1 if quick else None])]
+        demo, clean, outside = ([c.result() for c in cases] for cases in (demo_cases, clean_cases, outside_cases))
     results = {
         "recovery": rate(demo, sum(line["right"] for line in demo)),
         "located": rate(demo, sum(line["located"] for line in demo)),

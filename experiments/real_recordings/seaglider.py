@@ -75,7 +75,9 @@ def _recording(name: str, rows: pd.DataFrame) -> Recording:
         "rho": density,
         "depth_rate": np.gradient(depth, t),
     }
-    return Recording(f"dive {name}", t[inside] - t[0], {k: v[inside] for k, v in columns.items()}, f"flight.csv, dive {name}")
+    return Recording(
+        f"dive {name}", t[inside] - t[0], {k: v[inside] for k, v in columns.items()}, f"flight.csv, dive {name}"
+    )
 
 
 def report(out: Path) -> dict:

@@ -127,7 +127,8 @@ def search(
             break
         rms = concentrated_sigma(output_errors(fitted, runs, states), runs)
         settled = bool(jnp.all(jnp.abs(rms / problem.sigma - 1.0) < 0.003, where=estimated))
-        problem = dataclasses.replace(problem, sigma=jnp.where(estimated, rms, problem.sigma))
+        # a channel without errors, such as one that was never measured, says nothing of its noise
+        problem = dataclasses.replace(problem, sigma=jnp.where(estimated & (rms > 0.0), rms, problem.sigma))
         if settled:
             break
     return fitted, states, problem.sigma, cost, total, result
