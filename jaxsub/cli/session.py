@@ -1,5 +1,6 @@
 """What every command sets up: double precision, the compilation cache, progress on the terminal."""
 
+import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +18,8 @@ console = Console(stderr=True)
 
 def start() -> None:
     """Double precision, and compiled programs kept in the user's cache folder."""
+    # tracing makes millions of short-lived objects, and collecting them at the default threshold costs seconds
+    gc.set_threshold(200_000, 50, 50)
     jax.config.update("jax_enable_x64", True)
     folder = Path(platformdirs.user_cache_dir("jaxsub")) / f"jax-{jax.__version__}"
     jax.config.update("jax_compilation_cache_dir", str(folder))

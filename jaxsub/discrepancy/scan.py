@@ -13,7 +13,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
-from scipy import stats
+from scipy import special
 
 from ..effects import AbstractEffect, AbstractSensor, admissible, amplitudes, with_numbers
 from ..estimate import Fit, Problem
@@ -115,7 +115,7 @@ def _score(effect: AbstractEffect, b: np.ndarray, G: np.ndarray, before: np.ndar
     statistic = float(np.dot(amplitude, b.sum(0)))
     blocks = b @ amplitude - np.einsum("bij,i,j->b", G, amplitude, amplitude)
     inflation = score_inflation(blocks, statistic)
-    p_value = min(1.0, tried * float(stats.chi2.sf(statistic / inflation, len(before))))
+    p_value = min(1.0, tried * float(special.chdtrc(len(before), statistic / inflation)))
     names = amplitudes(effect)
     values = dict(zip(names, amplitude.tolist(), strict=True)) if names else {}
     # a lag that wants to be of the other sign shows as a negative share of its own grid value

@@ -2,7 +2,7 @@
 
 import numpy as np
 from jaxtyping import Float
-from scipy import stats
+from scipy import special
 
 from ..estimate import Fit
 
@@ -19,7 +19,7 @@ def whiteness_p_value(fit: Fit) -> float:
     least = 1.0
     for channel in range(residual.shape[-1]):
         z = _scaled_correlations(residual[..., channel], mask[..., channel])
-        least = min(least, float(stats.norm.sf(z[0])), float(stats.norm.sf(z.sum() / np.sqrt(_LAGS))))
+        least = min(least, float(special.ndtr(-z[0])), float(special.ndtr(-z.sum() / np.sqrt(_LAGS))))
     return min(1.0, 2.0 * residual.shape[-1] * least)
 
 
