@@ -61,7 +61,10 @@ def case(seed: int, *concealed: AbstractEffect | None, again: bool = False) -> d
         if again:
             improved = folder / "out" / "improved.toml"
             line["again"] = judge(folder, str(improved.relative_to(folder)), "again")["verdict"]
-    session.console.print(f"{line['concealed']}: {line['verdict']} {names} {line['seconds']:.0f} s", highlight=False)
+    said = f"{line['concealed']}: {line['verdict']} {names} {line['seconds']:.0f} s"
+    session.console.print(said, highlight=False, markup=False)
+        f"{line['concealed']}: {line['verdict']} {names} {line['seconds']:.0f} s", highlight=False, markup=False
+    )
     return line
 
 

@@ -50,7 +50,7 @@ def run(out: Path, seed: int, overwrite: bool) -> None:
         diagnosis = write_diagnosis(vehicle, runs[:-1], runs[-1:], folder)
     show(diagnosis, out)
     if concealed is not None:
-        session.console.print(f"concealed was: {concealed.label}", highlight=False)
+        session.console.print(f"concealed was: {concealed.label}", highlight=False, markup=False)
 
 
 def make_files(folder: Path, seed: int, *chosen: AbstractEffect | None) -> AbstractEffect | None:

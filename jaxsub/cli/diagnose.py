@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.panel import Panel
+from rich.text import Text
 
 from ..discrepancy import Diagnosis
 from ..discrepancy import diagnose as diagnose_runs
@@ -46,5 +47,5 @@ def show(diagnosis: Diagnosis, out: Path) -> None:
     held = diagnosis.fit["held_out"]
     channel = max(held["baseline"], key=lambda c: held["baseline"][c] / max(held["improved"][c], 1e-12))
     gain = f"held-out rms/σ of {channel}: {held['baseline'][channel]:.2f} before, {held['improved'][channel]:.2f} after"
-    session.console.print(Panel(f"{diagnosis.summary}\n{gain}", title=diagnosis.verdict, expand=False))
-    session.console.print(f"report: {out / 'report.html'}", highlight=False)
+    session.console.print(Panel(Text(f"{diagnosis.summary}\n{gain}"), title=diagnosis.verdict, expand=False))
+    session.console.print(f"report: {out / 'report.html'}", highlight=False, markup=False)

@@ -5,6 +5,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from rich.markup import escape
 from rich.table import Table
 
 from ..discrepancy import batch
@@ -61,8 +62,8 @@ def _write(found: Fit, said: Identifiability, folder: Path) -> None:
 
 def _show(found: Fit, said: Identifiability) -> None:
     for sentence in said.sentences():
-        session.console.print(sentence, highlight=False)
+        session.console.print(sentence, highlight=False, markup=False)
     table = Table("coefficient", "value", "standard error")
     for name, value in found.values.items():
-        table.add_row(name, f"{value:.6g}", f"{found.standard_errors[name]:.2g}")
+        table.add_row(escape(name), f"{value:.6g}", f"{found.standard_errors[name]:.2g}")
     session.console.print(table)

@@ -8,6 +8,7 @@ from pathlib import Path
 import jax
 import platformdirs
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from ..recording import Recording, load
@@ -31,7 +32,7 @@ def start() -> None:
 def progress(title: str) -> Iterator[Callable[[str], None]]:
     """A spinner that says what is being done; on a pipe, a line for each thing."""
     if not console.is_terminal:
-        yield lambda message: console.print(f"{title}: {message}", highlight=False, soft_wrap=True)
+        yield lambda message: console.print(f"{title}: {message}", highlight=False, soft_wrap=True, markup=False)
         return
     columns = (
         SpinnerColumn(),
@@ -41,7 +42,7 @@ def progress(title: str) -> Iterator[Callable[[str], None]]:
     )
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting", total=None, title=title)
-        yield lambda message: bar.update(task, description=message)
+        yield lambda message: bar.update(task, description=escape(message))
 
 
 def load_runs(paths: Sequence[Path], vehicle: AbstractVehicle) -> list[Recording]:
