@@ -63,8 +63,6 @@ def case(seed: int, *concealed: AbstractEffect | None, again: bool = False) -> d
             line["again"] = judge(folder, str(improved.relative_to(folder)), "again")["verdict"]
     said = f"{line['concealed']}: {line['verdict']} {names} {line['seconds']:.0f} s"
     session.console.print(said, highlight=False, markup=False)
-        f"{line['concealed']}: {line['verdict']} {names} {line['seconds']:.0f} s", highlight=False, markup=False
-    )
     return line
 
 
