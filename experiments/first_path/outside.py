@@ -1,4 +1,4 @@
-"""Forces that no effect of the vocabulary has, each a user's own small class."""
+"""Forces that no effect of the vocabulary has, through a user's own small class."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -12,46 +12,22 @@ from jaxsub.effects.base import amplitude
 from jaxsub.parameters import number
 
 
-class HeadingForce(AbstractForce):
-    """A moment that depends on the heading, such as a magnetic or a mooring moment: τ = a sin(n ψ + φ₀)."""
+class PeriodicForce(AbstractForce):
+    """A force that comes and goes with a position: with the heading as a mooring's, with depth as in layers of water.
 
-    name: ClassVar[str] = "heading-force"
+    τ = a sin(k η + φ₀) for one of the positions η (rad or m).
+    """
+
+    name: ClassVar[str] = "periodic-force"
     family: ClassVar[str] = "outside"
     equation: str = eqx.field(static=True)
-    harmonic: float = eqx.field(static=True)
-    size: Array = amplitude("N*m")
-
-    @classmethod
-    def candidates(cls, facts: Facts) -> "Sequence[HeadingForce]":
-        """None: this is what the vocabulary lacks."""
-        return []
-
-    @property
-    def where(self) -> tuple[str, ...]:
-        """The one equation."""
-        return (self.equation,)
-
-    @property
-    def expression(self) -> str:
-        """The moment."""
-        return f"a sin({self.harmonic:g} ψ)"
-
-    def force(self, motion: Motion) -> dict[str, Array]:
-        """The moment along the motion."""
-        return {self.equation: self.size * jnp.sin(self.harmonic * motion.positions["psi"] + 0.5)}
-
-
-class DepthForce(AbstractForce):
-    """A force that comes and goes with depth, such as layers of different density: τ = a sin(k z)."""
-
-    name: ClassVar[str] = "layer-force"
-    family: ClassVar[str] = "outside"
-    equation: str = eqx.field(static=True)
+    position: str = eqx.field(static=True)
     wavenumber: float = eqx.field(static=True)
+    phase: float = eqx.field(static=True)
     size: Array = amplitude("N")
 
     @classmethod
-    def candidates(cls, facts: Facts) -> "Sequence[DepthForce]":
+    def candidates(cls, facts: Facts) -> "Sequence[PeriodicForce]":
         """None: this is what the vocabulary lacks."""
         return []
 
@@ -63,17 +39,17 @@ class DepthForce(AbstractForce):
     @property
     def expression(self) -> str:
         """The force."""
-        return f"a sin({self.wavenumber:g} z)"
+        return f"a sin({self.wavenumber:g} {self.position} + {self.phase:g})"
 
     def force(self, motion: Motion) -> dict[str, Array]:
         """The force along the motion."""
-        return {self.equation: self.size * jnp.sin(self.wavenumber * motion.positions["z"])}
+        return {self.equation: self.size * jnp.sin(self.wavenumber * motion.positions[self.position] + self.phase)}
 
 
 OUTSIDE = (
-    HeadingForce("yaw", 4.0, number(60.0)),
-    HeadingForce("sway", 6.0, number(60.0)),
-    HeadingForce("roll", 3.0, number(40.0)),
-    DepthForce("heave", 2.5, number(25.0)),
-    DepthForce("pitch", 3.0, number(25.0)),
+    PeriodicForce("yaw", "psi", 4.0, 0.5, number(60.0)),
+    PeriodicForce("sway", "psi", 6.0, 0.5, number(60.0)),
+    PeriodicForce("roll", "psi", 3.0, 0.5, number(40.0)),
+    PeriodicForce("heave", "z", 2.5, 0.0, number(25.0)),
+    PeriodicForce("pitch", "z", 3.0, 0.0, number(25.0)),
 )

@@ -1,9 +1,10 @@
 """The whole path: fit, locate, name, model, show."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Array
 
 from ..effects import VOCABULARY, AbstractEffect, candidates
 from ..errors import InputError
@@ -17,14 +18,12 @@ from .columns import Trajectory, facts
 from .diagnosis import Diagnosis, Location, Physics, Rival, Verdict
 from .locate import Field, effect_share, locate, locations
 from .name import Naming, Step, certain, name
-from .refit import SIGNIFICANCE
+from .refit import SIGNIFICANCE, Progress
 from .show import HeldOut, channel_quality, coefficients, estimates, hold, overlays, record_sigma, run_quality
 from .whiteness import whiteness_p_value
 
 EXPLAINED = 0.75
 _TWIN = 0.01
-
-Progress = Callable[[str], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,8 +68,7 @@ def diagnose(
     held_out = [hold(model.vehicle, runs, chosen, size, sigma) for model in models]
     judged = judge(baseline, naming, held_out)
     before, improved, after = held_out[0], models[len(judged.steps)], held_out[len(judged.steps)]
-    last_path = Trajectory.of(improved)
-    remaining = locate(improved, last_path, train).traces if judged.steps else field.traces
+    remaining = locate(improved, Trajectory.of(improved), train).traces if judged.steps else field.traces
     where = _where(judged, baseline, path, field, train)
     physics = [_physics(step, improved) for step in judged.steps]
     before_train = channel_scaled(baseline, sigma)
@@ -105,9 +103,8 @@ def diagnose(
 def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     """The recordings as the batch that `vehicle` takes, with as many integration steps a sample as it needs."""
     layout = vehicle.layout
-    n = len(layout.equations)
     rates = np.linalg.solve(np.asarray(vehicle.mass_matrix()), np.asarray(vehicle.damping_matrix()))
-    fastest = float(np.max(np.abs(np.linalg.eigvals(rates)))) if n else 0.0
+    fastest = float(np.max(np.abs(np.linalg.eigvals(rates))))
     longest = max(float(np.diff(r.times).max()) for r in recordings)
     # linear damping is exact at any step; effects that replace it have the same rate and are not
     substeps = int(np.clip(np.ceil(longest * fastest / 1.5), 1, 16))
@@ -173,7 +170,7 @@ def explained(baseline: Fit, improved: Fit) -> float:
     return float(np.clip((squares(baseline) - squares(improved)) / above, 0.0, 1.0)) if above > 0.0 else 1.0
 
 
-def channel_scaled(found: Fit, sigma) -> dict[str, float]:
+def channel_scaled(found: Fit, sigma: Array) -> dict[str, float]:
     """rms(error)/σ on the training runs with a common σ for baseline and improved."""
     return {c: found.rms[c] * float(found.sigma[i] / sigma[i]) for i, c in enumerate(found.vehicle.layout.channels)}
 

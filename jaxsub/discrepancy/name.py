@@ -10,13 +10,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect, number_fields
+from ..effects import AbstractEffect, numbers
 from ..estimate import Fit, evaluate, fit, search
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .columns import Trajectory
 from .diagnosis import Candidate
-from .refit import SIGNIFICANCE, Explanation, refit_all
+from .refit import SIGNIFICANCE, Explanation, Progress, refit_all
 from .scan import ABSORBED, Score, scan
 
 MOST_EFFECTS = 3
@@ -24,8 +24,6 @@ _CERTAIN = 0.9
 _POSSIBLE = 0.02
 _GROSS = 5.0
 _PIECES = 8
-
-Progress = Callable[[str], None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,7 +118,7 @@ def _weights(before: Fit, usable: list[Explanation]) -> list[float]:
     """Posterior weights of refitted explanations, equal before the data."""
     least = min(usable, key=lambda explanation: explanation.cost)
     samples = float(np.sum(np.asarray(before.runs.mask)))
-    size = np.array([len(number_fields(e.effect)) for e in usable])
+    size = np.array([len(numbers(e.effect)) for e in usable])
     log = -np.array([e.cost for e in usable]) / noise_inflation(before, least) - 0.5 * size * np.log(samples)
     weights = np.exp(log - log.max())
     return (weights / weights.sum()).tolist()
@@ -150,7 +148,7 @@ def _table(scores: Sequence[Score], refitted: list[Explanation]) -> list[Candida
         effect = score.effect
         symbols = effect.symbols()
         said = outcome.get(effect.label, _outcome(score))
-        predicted = {symbols[f.name]: float(getattr(effect, f.name)) for f in number_fields(effect)}
+        predicted = {symbols[field]: value for field, value in numbers(effect).items()}
         line = Candidate(
             effect.name, effect.label, score.statistic, score.degrees, score.p_value, predicted, score.kept, said
         )

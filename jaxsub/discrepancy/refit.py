@@ -6,11 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from ..effects import AbstractEffect, admissible, number_fields, with_numbers
+from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
 from ..estimate import Fit, search
 from .columns import Trajectory
 from .scan import Score, plausible
 
+Progress = Callable[[str], None]
 SIGNIFICANCE = 0.01
 _REFITS = 4
 _CONTENDER = 0.6
@@ -18,7 +19,7 @@ _CONTENDER = 0.6
 
 @dataclasses.dataclass(frozen=True)
 class Explanation:
-    """A refitted candidate: its search result, cost, and weight among those refitted beside it."""
+    """A refitted candidate: what the search found, at which cost, and whether physics admits it."""
 
     score: Score
     found: tuple
@@ -44,9 +45,7 @@ def contenders(scores: Sequence[Score]) -> list[Score]:
     return near[:_REFITS]
 
 
-def refit_all(
-    fit: Fit, view: Fit, path: Trajectory, scores: Sequence[Score], progress: Callable[[str], None]
-) -> list[Explanation]:
+def refit_all(fit: Fit, view: Fit, path: Trajectory, scores: Sequence[Score], progress: Progress) -> list[Explanation]:
     """The contenders among `scores`, each in the model, fitted to the runs of `fit` from the coefficients of `view`.
 
     Two at a time, since compiling leaves the other core idle.
@@ -62,8 +61,8 @@ def _refit(fit: Fit, view: Fit, path: Trajectory, score: Score) -> Explanation:
     """All coefficients fitted again with the candidate in the model, from its predicted size or a tenth of it."""
     tries = []
     for share in (1.0, 0.1):
-        numbers = {f.name: getattr(score.effect, f.name) for f in number_fields(score.effect)}
-        scaled = {k: v * share if _linear(score.effect, k) else v for k, v in numbers.items()}
+        linear = amplitudes(score.effect)
+        scaled = {field: value * share if field in linear else value for field, value in numbers(score.effect).items()}
         vehicle = view.vehicle.with_effect(with_numbers(score.effect, scaled))
         found = search(vehicle, fit.runs, sigma=fit.sigma, start=fit.start)
         tries.append((float(found[3]), found))
@@ -71,16 +70,12 @@ def _refit(fit: Fit, view: Fit, path: Trajectory, score: Score) -> Explanation:
             break
     cost, found = min(tries, key=lambda item: item[0] if np.isfinite(item[0]) else np.inf)
     effect = found[0].effects[-1]
-    values = {f.name: float(getattr(effect, f.name)) for f in number_fields(effect)}
-    right = bool(np.isfinite(cost)) and admissible(effect, values) and _alive(effect, values)
+    right = bool(np.isfinite(cost)) and admissible(effect, numbers(effect)) and _alive(effect)
     right = right and plausible(effect, path, view)
     return Explanation(score, found, cost if np.isfinite(cost) else np.inf, right)
 
 
-def _linear(effect: AbstractEffect, field: str) -> bool:
-    return next(f for f in number_fields(effect) if f.name == field).metadata["role"] == "amplitude"
-
-
-def _alive(effect: AbstractEffect, values: dict[str, float]) -> bool:
+def _alive(effect: AbstractEffect) -> bool:
     """Whether a shape such as a lag stayed away from the bound at which the effect vanishes."""
-    return all(values[f.name] > 1e-6 for f in number_fields(effect) if f.metadata["role"] == "shape")
+    linear = amplitudes(effect)
+    return all(value > 1e-6 for field, value in numbers(effect).items() if field not in linear)

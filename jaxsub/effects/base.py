@@ -119,6 +119,11 @@ def amplitudes(effect: AbstractEffect | type[AbstractEffect]) -> list[str]:
     return [field.name for field in number_fields(effect) if field.metadata["role"] == "amplitude"]
 
 
+def numbers(effect: AbstractEffect) -> dict[str, float]:
+    """The values of the numeric fields, by field."""
+    return {field.name: float(getattr(effect, field.name)) for field in number_fields(effect)}
+
+
 def options(effect: AbstractEffect) -> dict[str, Any]:
     """The static choices of an effect: its equation, actuator or channel, and fixed sizes."""
     return {
