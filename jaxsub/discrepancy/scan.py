@@ -50,10 +50,10 @@ def project(fit: Fit, columns: Float[Array, "r k c q"]) -> tuple[Array, Array, A
 @eqx.filter_jit
 def _project(model: Linearised, problem: Problem, columns: Array) -> tuple[Array, Array, Array]:
     weight = (problem.runs.mask / problem.sigma)[..., None]
-    S, theta, start = columns * weight, model.theta * weight, model.start * weight
+    S, theta, start = columns * weight, model.theta * weight, model.start * weight * problem.spread
     residual = model.error / problem.sigma
     before = jnp.sum(S**2, (0, 1, 2))
-    own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.diag(problem.spread**-2.0)
+    own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(len(problem.spread))
 
     def off_start(M: Array) -> Array:
         return M - jnp.einsum("rkcs,rsq->rkcq", start, jnp.linalg.solve(own, jnp.einsum("rkcs,rkcq->rsq", start, M)))

@@ -1,11 +1,11 @@
-"""One `fit`, one `Fit`: maximum likelihood by Gauss–Newton with Levenberg–Marquardt damping."""
+"""One `fit`, one `Fit`: maximum likelihood by whichever method."""
 
 import dataclasses
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from ..likelihood import Linearised, concentrated_sigma, linearise, residual_outputs
@@ -14,9 +14,11 @@ from ..results import RESULTS
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 from ..vehicle.inertia import indefinite
+from .method import AbstractMethod
+from .methods import gauss_newton
 from .problem import Problem
 
-_CONCENTRATIONS, _MAX_STEPS = 12, 60
+_CONCENTRATIONS = 12
 
 
 class Fit(eqx.Module):
@@ -29,7 +31,7 @@ class Fit(eqx.Module):
     - `model`: the vehicle linearised along the fitted trajectory.
     - `cost`: ½ Σ whitened residuals², priors included. `gradient_norm`: largest |∂cost/∂y| in scaled coordinates,
       relative to the largest curvature's square root: how many standard errors the optimum may still be away.
-    - `steps`: taken by the search. `result`: a `RESULTS` value.
+    - `steps`: evaluations by the search. `result`: a `RESULTS` value. `known_start`: whether `start` was given.
     """
 
     vehicle: AbstractVehicle
@@ -43,6 +45,7 @@ class Fit(eqx.Module):
     steps: Array
     result: RESULTS
     names: tuple[str, ...] = eqx.field(static=True)
+    known_start: bool = eqx.field(static=True)
 
     @property
     def values(self) -> dict[str, float]:
@@ -58,7 +61,8 @@ class Fit(eqx.Module):
     @property
     def problem(self) -> Problem:
         """The least-squares problem at whose optimum this is."""
-        return Problem.of(self.vehicle, self.runs, self.sigma)
+        start = self.start if self.known_start else None
+        return Problem.of(self.vehicle, self.runs, self.sigma, start, known_start=self.known_start)
 
     @property
     def residual(self) -> Float[Array, "r k c"]:
@@ -77,36 +81,20 @@ def channel_rms(residual: Array, runs: Runs, channels: tuple[str, ...]) -> dict[
     return dict(zip(channels, np.sqrt(np.asarray(mean_square)).tolist(), strict=True))
 
 
-@eqx.filter_jit
-def _search(problem: Problem, y: Array) -> tuple[Array, Array, Array, RESULTS]:
-    """Coordinates of the optimum from the start `y`, its cost, the steps taken and what became of it."""
-    solution = optx.least_squares(
-        lambda y, problem: problem.residuals(y),
-        # a cost that settles to 0.004 is under a hundredth of what a standard error costs; `Fit.gradient_norm` checks
-        optx.LevenbergMarquardt(rtol=1e-7, atol=0.004, norm=optx.rms_norm),
-        y,
-        args=problem,
-        options={"jac": "fwd"},
-        max_steps=_MAX_STEPS,
-        throw=False,
-    )
-    cost = 0.5 * jnp.sum(solution.state.f_info.residual**2)
-    # a step into NaN is refused by the trust region, so only a start that does not run leaves a NaN behind
-    result = RESULTS.where(jnp.isfinite(cost), RESULTS.promote(solution.result), RESULTS.nan_start)
-    return solution.value, cost, solution.stats["num_steps"], result
-
-
 def search(
     vehicle: AbstractVehicle,
     runs: Runs,
     *,
+    method: AbstractMethod | None = None,
     sigma: Array | None = None,
     start: Array | None = None,
     moving: bool = True,
+    known_start: bool = False,
 ) -> tuple[AbstractVehicle, Array, Array, Array, Array, RESULTS]:
-    """The maximum-likelihood vehicle, initial states, noise, cost, steps and result, without any statistics.
+    """The maximum-likelihood vehicle, initial states, noise, cost, evaluations and result, without any statistics.
 
-    `moving` false keeps the vehicle and finds the initial states alone, as a run that the fit did not see asks for.
+    `method` is Gauss–Newton where none is given. `known_start` takes the initial states `start` for the truth. `moving`
+    false keeps the vehicle and finds the initial states alone, as a run that the fit did not see asks for.
     Noise comes from `sigma`, else from the vehicle file; channels whose noise is to be estimated have it concentrated
     out: fit, take the rms, fit again from there, until it settles.
     """
@@ -117,10 +105,13 @@ def search(
         if sigma is not None
         else jnp.where(estimated, _signal(runs), jnp.array([s or 1.0 for s in given]))
     )
-    problem = Problem.of(vehicle, runs, noise, start, moving=moving)
+    problem = Problem.of(vehicle, runs, noise, start, moving=moving, known_start=known_start)
     y, total = problem.coordinates(), jnp.asarray(0)
     for _ in range(_CONCENTRATIONS):
-        y, cost, steps, result = _search(problem, y)
+        found = (method or gauss_newton()).run(problem, y[None])
+        y, cost, steps, result = jax.tree.map(
+            lambda leaf: leaf[0], (found.y, found.cost, found.evaluations, found.result)
+        )
         total = total + steps
         fitted, states = problem.split(y)
         if not bool(estimated.any()) or not bool(jnp.isfinite(cost)):
@@ -153,14 +144,24 @@ def _signal(runs: Runs) -> Array:
     return jnp.where(spread > 0.0, spread, 1.0)
 
 
-def fit(vehicle: AbstractVehicle, runs: Runs, *, sigma: Array | None = None, start: Array | None = None) -> Fit:
+def fit(
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    *,
+    method: AbstractMethod | None = None,
+    sigma: Array | None = None,
+    start: Array | None = None,
+    known_start: bool = False,
+) -> Fit:
     """Fit the free numbers of `vehicle`, and an initial state for each run, to `runs`.
 
-    `sigma` overrides the file's noise; `start` is where the initial states' search begins. A failure is a value in
-    `Fit.result`, never an exception.
+    `method` is Gauss–Newton where none is given. `sigma` overrides the file's noise; `start` is where the initial
+    states' search begins, or with `known_start` what they are. A failure is a value in `Fit.result`, no exception.
     """
-    fitted, states, noise, cost, steps, result = search(vehicle, runs, sigma=sigma, start=start)
-    return evaluate(fitted, runs, states, noise, cost=cost, steps=steps, result=result)
+    fitted, states, noise, cost, steps, result = search(
+        vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start
+    )
+    return evaluate(fitted, runs, states, noise, cost=cost, steps=steps, result=result, known_start=known_start)
 
 
 def evaluate(
@@ -172,17 +173,19 @@ def evaluate(
     cost: Array,
     steps: Array,
     result: RESULTS,
+    known_start: bool = False,
 ) -> Fit:
     """The `Fit` of a vehicle that a search has already found."""
     model = linearise(vehicle, runs, start)
     names = tuple(row.name for row in vehicle.layout.free)
-    covariance, gradient = _statistics(Problem.of(vehicle, runs, sigma), model)
+    problem = Problem.of(vehicle, runs, sigma, start if known_start else None, known_start=known_start)
+    covariance, gradient = _statistics(problem, model)
     inertia = np.asarray(vehicle.mass_matrix())
     if not np.all(np.isfinite(inertia)) or indefinite(inertia, vehicle.layout.equations, []):
         result = RESULTS.indefinite_inertia
     elif bool(result == RESULTS.successful) and not float(gradient) < 0.1:
         result = RESULTS.not_stationary
-    return Fit(vehicle, runs, start, sigma, covariance, model, cost, gradient, steps, result, names)
+    return Fit(vehicle, runs, start, sigma, covariance, model, cost, gradient, steps, result, names, known_start)
 
 
 @eqx.filter_jit
@@ -201,13 +204,14 @@ def _statistics(problem: Problem, model: Linearised) -> tuple[Array, Array]:
 def information_matrix(problem: Problem, model: Linearised) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:
     r"""Fisher information of the free parameters (physical units) with the initial states eliminated, and the gradient.
 
-    $I = \sum_r J_\theta^T J_\theta - J_\theta^T J_x (J_x^T J_x + S^{-2})^{-1} J_x^T J_\theta$ plus the prior's.
+    $I = \sum_r J_\theta^T J_\theta - J_\theta^T J_x (J_x^T J_x + 1)^{-1} J_x^T J_\theta$ plus the prior's, with $J_x$
+    by initial states in units of their spread, so that a known one, which has none, drops out.
     """
     weight = problem.runs.mask / problem.sigma
-    theta, start = model.theta * weight[..., None], model.start * weight[..., None]
+    theta, start = model.theta * weight[..., None], model.start * weight[..., None] * problem.spread
     residual = model.error / problem.sigma
     cross = lambda a, b: jnp.einsum("rkcp,rkcq->rpq", a, b)
-    own = cross(start, start) + jnp.diag(problem.spread**-2.0)
+    own = cross(start, start) + jnp.eye(len(problem.spread))
     mixed = cross(theta, start)
     gain = jnp.linalg.solve(own, jnp.swapaxes(mixed, 1, 2))
     information = jnp.sum(cross(theta, theta) - mixed @ gain, 0) + jnp.diag(problem.prior_std**-2.0)

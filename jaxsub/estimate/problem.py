@@ -1,5 +1,7 @@
 """A fit as a least-squares problem in unbounded, scaled coordinates."""
 
+from collections.abc import Callable
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -25,7 +27,8 @@ class Problem(eqx.Module):
     - `sigma`: (c,) noise of each channel, SI.
     - `transform`: of the free parameters; `origin`: (p,) the coordinates where they start, and stay where `moving` is
       false. `prior_mean`, `prior_std`: (p,), the latter infinite where there is none.
-    - `guess`, `spread`: (R, s) and (s,) Gaussian prior of the initial states.
+    - `guess`, `spread`: (R, s) and (s,) Gaussian prior of the initial states; a known one has no spread.
+    - `known_start`: whether initial states are known, and no coordinates.
     """
 
     vehicle: AbstractVehicle
@@ -33,20 +36,28 @@ class Problem(eqx.Module):
     sigma: Float[Array, " c"]
     transform: Transform
     origin: Float[Array, " p"]
-    moving: Bool[Array, ""]
+    moving: Bool[Array, " p"]
     prior_mean: Float[Array, " p"]
     prior_std: Float[Array, " p"]
     guess: Float[Array, "r s"]
     spread: Float[Array, " s"]
+    known_start: bool = eqx.field(static=True)
 
     @classmethod
     def of(
-        cls, vehicle: AbstractVehicle, runs: Runs, sigma: Array, start: Array | None = None, *, moving: bool = True
+        cls,
+        vehicle: AbstractVehicle,
+        runs: Runs,
+        sigma: Array,
+        start: Array | None = None,
+        *,
+        moving: bool | Bool[Array, " p"] = True,
+        known_start: bool = False,
     ) -> "Problem":
         """The problem of fitting `vehicle` to `runs`; the search starts from the initial states `start`, if given.
 
-        `moving` false keeps the parameters and frees the initial states alone. It is data and not structure, so the
-        same compiled search serves both.
+        `moving` says which parameters may move: false frees the initial states alone. It is data and not structure, so
+        one compiled search serves every choice. `known_start` takes `start` for the truth.
         """
         rows = vehicle.layout.free
         values = vehicle.values()
@@ -62,11 +73,12 @@ class Problem(eqx.Module):
             jnp.asarray(sigma),
             transform,
             transform.to_free(jnp.asarray(theta)),
-            jnp.asarray(moving),
+            jnp.broadcast_to(jnp.asarray(moving), (len(rows),)),
             jnp.asarray(means),
             jnp.asarray([row.prior_std for row in rows]),
             guess if start is None else start,
-            spread,
+            jnp.zeros_like(spread) if known_start else spread,
+            known_start,
         )
 
     def split(self, y: Float[Array, " d"]) -> tuple[AbstractVehicle, Float[Array, "r s"]]:
@@ -75,38 +87,70 @@ class Problem(eqx.Module):
         names = [row.name for row in self.vehicle.layout.free]
         theta = self.transform.to_physical(jnp.where(self.moving, y[:p], self.origin))
         vehicle = self.vehicle.with_values(dict(zip(names, theta, strict=True)))
-        return vehicle, self.guess + self.spread * y[p:].reshape(self.guess.shape)
+        return vehicle, self.guess + self.spread * self.moved(y)
+
+    def moved(self, y: Float[Array, " d"]) -> Float[Array, "r s"]:
+        """How far the initial states at `y` are from their guess, in their spreads."""
+        states = y[len(self.prior_mean) :]
+        return jnp.zeros_like(self.guess) if self.known_start else states.reshape(self.guess.shape)
 
     def coordinates(self) -> Float[Array, " d"]:
         """The coordinates of the start."""
-        return jnp.concatenate([self.origin, jnp.zeros(self.guess.size)])
+        return jnp.concatenate([self.origin, jnp.zeros(0 if self.known_start else self.guess.size)])
+
+    def at(self, theta: Float[Array, " p"]) -> Float[Array, " d"]:
+        """The coordinates of the physical parameters `theta` and the guessed initial states."""
+        return self.coordinates().at[: len(theta)].set(self.transform.to_free(theta))
 
     def residuals(self, y: Float[Array, " d"]) -> Float[Array, " m"]:
         """Whitened errors of the outputs, then of the priors."""
-        return _residuals(y, problem=self)
+        return jnp.concatenate([_outputs(self, y, jnp.zeros(len(self.spread))).ravel(), _prior(self, y)])
+
+    def cost(self, y: Float[Array, " d"]) -> Float[Array, ""]:
+        r"""$\tfrac12\sum$ residuals²: minus the log-likelihood, up to its constant."""
+        return 0.5 * jnp.sum(self.residuals(y) ** 2)
+
+    def expand(self, y: Float[Array, " d"]) -> "Expansion":
+        """The cost about `y` to second order, its curvature by Gauss and Newton: $J^TJ$.
+
+        Runs do not feel each other's initial states, so one tangent a state serves every run: p + s simulations instead
+        of p + R s.
+        """
+        p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
+        still = jnp.zeros(len(self.spread))
+
+        def shown(change: Array) -> Array:
+            return _outputs(self, y.at[:p].add(change[:p]), still.at[:s].add(change[p:]))
+
+        error, columns = _value_and_columns(shown, jnp.zeros(p + s))
+        prior, slopes = _value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
+        theta, start = columns[..., :p], columns[..., p:]
+        own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(s)
+        mixed = jnp.einsum("rkcp,rkcs->prs", theta, start).reshape(p, len(y) - p)
+        among = jnp.einsum("rkcp,rkcq->pq", theta, theta) + slopes.T @ slopes
+        hessian = jnp.block([[among, mixed], [mixed.T, jax.scipy.linalg.block_diag(*own)]]) if s else among
+        by_theta = jnp.einsum("rkcp,rkc->p", theta, error) + slopes.T @ prior
+        by_start = jnp.einsum("rkcs,rkc->rs", start, error).ravel() + y[p:]
+        cost = 0.5 * (jnp.sum(error**2) + jnp.sum(prior**2) + jnp.sum(y[p:] ** 2))
+        return Expansion(cost, jnp.concatenate([by_theta, by_start]), hessian)
+
+    def expand_exactly(self, y: Float[Array, " d"]) -> "Expansion":
+        """The cost about `y` to second order, its curvature exact."""
+        return Expansion(self.cost(y), jax.grad(self.cost)(y), jax.hessian(self.cost)(y))
 
 
-@eqx.filter_custom_jvp
-def _residuals(y: Array, *, problem: Problem) -> Array:
-    output = _outputs(problem, y, jnp.zeros(len(problem.spread)))
-    return jnp.concatenate([output.ravel(), _prior(problem, y)])
+class Expansion(eqx.Module):
+    """A cost to second order about a point: its value, gradient (d,) and curvature (d, d)."""
+
+    cost: Float[Array, ""]
+    gradient: Float[Array, " d"]
+    hessian: Float[Array, "d d"]
 
 
-@_residuals.def_jvp
-def _residuals_jvp(primals: tuple[Array], tangents: tuple[Array], *, problem: Problem) -> tuple[Array, Array]:
-    """All columns of the Jacobian at once, whatever the tangent.
-
-    Runs do not feel each other's initial states, so one tangent a state serves every run: p + s simulations instead of
-    p + R s. A solver that asks for many tangents in a `vmap` shares them, and the model is compiled into it once.
-    """
-    (y,), (dy,) = primals, tangents
-    p, s = len(problem.prior_mean), len(problem.spread)
-    at_parameters = lambda theta, moved: _outputs(problem, jnp.concatenate([theta, y[p:]]), moved)
-    by_theta, by_state = jax.jacfwd(at_parameters, argnums=(0, 1))(y[:p], jnp.zeros(s))
-    along = by_theta @ dy[:p] + jnp.einsum("rkcs,rs->rkc", by_state, dy[p:].reshape(problem.guess.shape))
-    prior, prior_along = jax.jvp(lambda y: _prior(problem, y), (y,), (dy,))
-    value = jnp.concatenate([_outputs(problem, y, jnp.zeros(s)).ravel(), prior])
-    return value, jnp.concatenate([along.ravel(), prior_along])
+def _value_and_columns(f: Callable[[Array], Array], at: Float[Array, " q"]) -> tuple[Array, Array]:
+    """`f` at `at` and its Jacobian, columns last: forward mode, all columns in one batch."""
+    along = lambda tangent: jax.jvp(f, (at,), (tangent,))
+    return jax.vmap(along, out_axes=(None, -1))(jnp.eye(at.size, dtype=at.dtype))
 
 
 @eqx.filter_jit

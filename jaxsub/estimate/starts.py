@@ -1,0 +1,86 @@
+"""Monte-Carlo over initial guesses: where starts are, how often a method succeeds, and into which basins they fall."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy import stats
+from scipy.cluster import hierarchy
+
+from .method import Found
+from .problem import Problem
+
+
+def scattered(problem: Problem, spread: float, count: int, seed: int) -> Float[Array, "n d"]:
+    """Coordinates of `count` starts, each parameter drawn uniformly within ± `spread` of the size it has in `problem`.
+
+    A spread of 1 draws from zero to twice each value. Initial states start at their guess.
+    """
+    centre = np.asarray(problem.transform.to_physical(problem.origin))
+    draws = np.random.default_rng(seed).uniform(-spread, spread, (count, len(centre)))
+    starts = jnp.asarray(centre * (1.0 + draws))
+    return jnp.stack([problem.at(theta) for theta in starts])
+
+
+@dataclasses.dataclass(frozen=True)
+class Rate:
+    """A share of `count` trials with its 95 % interval by Wilson."""
+
+    successes: int
+    count: int
+
+    @property
+    def share(self) -> float:
+        """Successes over trials."""
+        return self.successes / self.count
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Lower and upper end."""
+        ends = stats.binomtest(self.successes, self.count).proportion_ci(method="wilson")
+        return float(ends.low), float(ends.high)
+
+    def to_json(self) -> dict:
+        """Plain numbers."""
+        return {"share": self.share, "interval": list(self.interval), "successes": self.successes, "count": self.count}
+
+
+def success(found: Found, best: float, margin: float = 0.1) -> Rate:
+    """How many searches came within `margin` of the least cost known: 0.1 is under half a standard error away.
+
+    One that failed, or whose cost is not a number, is no success and is counted.
+    """
+    cost = np.asarray(found.cost)
+    return Rate(int(np.sum(cost < best + margin)), len(cost))
+
+
+@dataclasses.dataclass(frozen=True)
+class Basin:
+    """Ends of searches that lie together: the least cost among them, how many there are, and the best's coordinates."""
+
+    cost: float
+    count: int
+    y: np.ndarray
+
+
+def basins(problem: Problem, found: Found, reach: float = 1.0) -> tuple[list[Basin], int]:
+    """The ends clustered, the lowest first, and how many searches have no finite end.
+
+    Ends belong together where one can go from each to the next in steps shorter than `reach` standard errors, as the
+    curvature at the best end has them.
+    """
+    cost, y = np.asarray(found.cost), np.asarray(found.y)
+    finite = np.flatnonzero(np.isfinite(cost) & np.isfinite(y).all(1))
+    lost = len(cost) - len(finite)
+    if not len(finite):
+        return [], lost
+    order = finite[np.argsort(cost[finite])]
+    curvature = np.asarray(problem.expand(jnp.asarray(y[order[0]])).hessian)
+    values, vectors = np.linalg.eigh(curvature)
+    whitened = (y[order] - y[order[0]]) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    label = np.ones(1, int)
+    if len(order) > 1:
+        label = hierarchy.fcluster(hierarchy.linkage(whitened, "single"), reach, "distance")
+    found_in = {basin: np.flatnonzero(label == basin) for basin in dict.fromkeys(label.tolist())}
+    return [Basin(float(cost[order[i[0]]]), len(i), y[order[i[0]]]) for i in found_in.values()], lost
