@@ -15,7 +15,6 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
-from ..results import RESULTS
 from .problem import Expansion
 
 # a direction with less of the curvature than this is rounding, and says nothing
@@ -40,8 +39,8 @@ class Damped(optx.AbstractMinimiser):
 
     Ends where the full step promises a gain below `tolerance`: $\tfrac12 g^TH^{-1}g$ is half the squared distance to
     the optimum in standard errors, so 1e-5 stops within 0.005 of one, whatever the units. A trial that is not finite
-    is refused, so only a start that does not run ends as `nan_start`; where no step however short is better the search
-    is `not_stationary`.
+    is refused, so only a start that does not run ends as `nonfinite`; where no step however short is better the search
+    ends as `nonlinear_divergence`.
     """
 
     expand: Callable[[Any, Array], Expansion] = eqx.field(static=True)
@@ -77,13 +76,12 @@ class Damped(optx.AbstractMinimiser):
 
     def terminate(
         self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any
-    ) -> tuple[Bool[Array, ""], RESULTS]:
+    ) -> tuple[Bool[Array, ""], optx.RESULTS]:
         """At the optimum; or stuck, where no step however short is better."""
         hopeless, stuck = jnp.isnan(state.decrement), state.damping > _MOST
-        result = RESULTS.where(stuck, RESULTS.not_stationary, RESULTS.promote(optx.RESULTS.successful))
-        return (state.decrement <= self.tolerance) | stuck | hopeless, RESULTS.where(
-            hopeless, RESULTS.nan_start, result
-        )
+        result = optx.RESULTS.where(stuck, optx.RESULTS.nonlinear_divergence, optx.RESULTS.successful)
+        done = (state.decrement <= self.tolerance) | stuck | hopeless
+        return done, optx.RESULTS.where(hopeless, optx.RESULTS.nonfinite, result)
 
     def postprocess(
         self, fn: Any, y: Array, aux: Any, args: Any, options: Any, state: _State, tags: Any, result: optx.RESULTS

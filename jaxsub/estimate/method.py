@@ -61,24 +61,34 @@ class Iterative(AbstractMethod):
     def run(
         self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
     ) -> Found:
-        """All starts through pools of lanes, one a core where there are enough of them. Not to be called in `jit`."""
-        lanes, cores = lanes_for(problem), os.cpu_count() or 1
-        if len(starts) < 4 * lanes * cores:
-            return _pooled(self, problem, starts, outputs, lanes)
-        # equal shares, the last filled up with copies, so that one compiled program serves all
-        share = -(-len(starts) // cores)
-        index = np.minimum(np.arange(share * cores), len(starts) - 1).reshape(cores, share)
-        own = lambda chosen: _pooled(self, problem, starts[chosen], None if outputs is None else outputs[chosen], lanes)
-        with ThreadPoolExecutor(cores) as threads:
-            parts = list(threads.map(lambda chosen: jax.block_until_ready(own(chosen)), index))
-        return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[: len(starts)], *parts)
+        """All starts through pools of lanes. Not to be called in `jit`."""
+        return over_cores(lambda y, z: _pooled(self, problem, y, z, lanes_for(problem)), problem, starts, outputs)
+
+
+def over_cores(
+    run: Callable[[Array, Array | None], Found], problem: Problem, starts: Array, outputs: Array | None
+) -> Found:
+    """`run(starts, outputs)` in equal shares, one a core, where there are starts enough to be worth it."""
+    cores = os.cpu_count() or 1
+    if len(starts) < 4 * lanes_for(problem) * cores:
+        return run(starts, outputs)
+    # the last share is filled up with copies, so that one compiled program serves all
+    share = -(-len(starts) // cores)
+    index = np.minimum(np.arange(share * cores), len(starts) - 1).reshape(cores, share)
+    own = lambda chosen: run(starts[chosen], None if outputs is None else outputs[chosen])
+    with ThreadPoolExecutor(cores) as threads:
+        parts = list(threads.map(lambda chosen: jax.block_until_ready(own(chosen)), index))
+    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[: len(starts)], *parts)
 
 
 @eqx.filter_jit
 def _pooled(method: Iterative, problem: Problem, starts: Array, outputs: Array | None, lanes: int) -> Found:
     of = problems(problem, outputs)
     ends = pool(method.solver, objective, starts, of, lanes=lanes, max_steps=method.max_steps)
-    return Found(ends.y, costs(of, ends.y, lanes), ends.steps, ends.result)
+    # without a value at the very start there is nothing that a search could have done
+    never = (ends.steps == 1) & (ends.result == RESULTS.promote(optx.RESULTS.nonfinite))
+    result = jax.vmap(lambda never, result: RESULTS.where(never, RESULTS.nan_start, result))(never, ends.result)
+    return Found(ends.y, costs(of, ends.y, lanes), ends.steps, result)
 
 
 def problems(problem: Problem, outputs: Array | None) -> Callable[[Int[Array, ""]], Problem]:

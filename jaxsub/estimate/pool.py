@@ -62,9 +62,7 @@ def pool(
         y, state, _ = solver.step(with_aux, lane.y, own, {}, lane.state, frozenset())
         done, result = solver.terminate(with_aux, y, own, {}, state, frozenset())
         steps = lane.steps + 1
-        # jaxsub's own solvers speak of its own results
-        result: Any = result if result._enumeration is RESULTS else RESULTS.promote(result)
-        result = RESULTS.where(jnp.all(jnp.isfinite(y)), result, _NONFINITE)
+        result = RESULTS.where(jnp.all(jnp.isfinite(y)), RESULTS.promote(result), _NONFINITE)
         done = done | (result != _SUCCESSFUL)
         result = RESULTS.where(done, result, _UNFINISHED)
         return _Lane(lane.index, y, state, steps), done | (steps >= max_steps), result

@@ -13,6 +13,7 @@ from ..likelihood import errors
 from ..parameters import Transform
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
+from .newton import second_order
 
 # how far an initial state that nothing measures may lie from rest: m/s, rad/s, rad, m
 _SPREAD = {"m/s": 1.0, "rad/s": 0.5, "rad": 0.5, "m": 10.0}
@@ -136,7 +137,8 @@ class Problem(eqx.Module):
 
     def expand_exactly(self, y: Float[Array, " d"]) -> "Expansion":
         """The cost about `y` to second order, its curvature exact."""
-        return Expansion(self.cost(y), jax.grad(self.cost)(y), jax.hessian(self.cost)(y))
+        cost, gradient, hessian, _ = second_order(lambda y, _: (self.cost(y), None), y, None)
+        return Expansion(cost, gradient, hessian)
 
 
 class Expansion(eqx.Module):

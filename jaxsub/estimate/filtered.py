@@ -1,0 +1,63 @@
+"""Estimation by filters: parameters and state together, sample after sample."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from ..filter.defaults import vehicle_filter
+from ..filter.ekf import AbstractFilter
+from ..filter.mekf import ModifiedKalmanFilter
+from ..filter.passes import identify
+from ..filter.vehicle import VehicleProcess, samples
+from ..results import RESULTS
+from .method import AbstractMethod, Found, costs, lanes_for, over_cores, problems
+from .problem import Problem
+
+
+class Filtered(AbstractMethod):
+    """A filter of state and parameters run over the recordings, `passes` times.
+
+    Its estimate is not the maximum of the likelihood: it is as good as one linearised look at each sample is, and
+    comes whatever the start. `Chain` completes it.
+
+    **Fields**
+
+    - `kind`: the modified extended Kalman filter of the paper, or the plain one.
+    - `spread`: how far off the start is taken to be, in each parameter's own size.
+    - `passes`: over the recordings; each begins with that spread again, so that no sample counts twice.
+    """
+
+    kind: type[AbstractFilter] = eqx.field(static=True, default=ModifiedKalmanFilter)
+    spread: float = 1.0
+    passes: int = eqx.field(static=True, default=3)
+
+    def run(
+        self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
+    ) -> Found:
+        """Filter from each of the `starts`. A filter that diverges ends as `nonfinite`. Not to be called in `jit`.
+
+        **Raises** `InputError` as `VehicleProcess.of` does.
+        """
+        VehicleProcess.of(problem.vehicle)
+        return over_cores(lambda y, z: _filtered(self, problem, y, z), problem, starts, outputs)
+
+
+@eqx.filter_jit
+def _filtered(method: Filtered, problem: Problem, starts: Array, outputs: Array | None) -> Found:
+    of, lanes, p = problems(problem, outputs), lanes_for(problem), len(problem.prior_mean)
+    process = VehicleProcess(problem.vehicle, problem.transform, problem.runs.substeps)
+    filter = vehicle_filter(process, problem.sigma, method.kind)
+    # a parameter that is held has no uncertainty to correct it by
+    root = jnp.diag(jnp.where(problem.moving, method.spread, 0.0))
+
+    def one(part: tuple[Array, Array]) -> tuple[Array, Array]:
+        index, y = part
+        found = identify(filter, samples(of(index).runs), problem.guess, y[:p], root, method.passes)
+        return y.at[:p].set(found.theta), found.diverged
+
+    y, diverged = jax.lax.map(one, (jnp.arange(len(starts)), starts), batch_size=lanes)
+    good, lost = RESULTS.promote(optx.RESULTS.successful), RESULTS.promote(optx.RESULTS.nonfinite)
+    result = jax.vmap(lambda gone: RESULTS.where(gone, lost, good))(diverged)
+    return Found(y, costs(of, y, lanes), jnp.full(len(starts), method.passes), result)

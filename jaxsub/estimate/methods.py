@@ -1,0 +1,68 @@
+"""The estimators by name: each a solver and what it is given. One object each, so that each is compiled for once."""
+
+import functools
+
+import optax
+import optimistix as optx
+
+from ..filter.ekf import ExtendedKalmanFilter
+from ..filter.mekf import ModifiedKalmanFilter
+from .damped import Damped
+from .filtered import Filtered
+from .method import Iterative
+from .nelder_mead import NelderMead
+from .newton import NewtonEq10
+from .problem import Problem
+
+
+@functools.cache
+def gauss_newton(tolerance: float = 1e-5) -> Iterative:
+    """Gauss–Newton with the damping of Levenberg and Marquardt."""
+    return Iterative(Damped(Problem.expand, tolerance), 60)
+
+
+@functools.cache
+def newton(tolerance: float = 1e-5) -> Iterative:
+    """Damped Newton with the exact Hessian."""
+    return Iterative(Damped(Problem.expand_exactly, tolerance), 60)
+
+
+@functools.cache
+def newton_eq10(tolerance: float = 1e-6) -> Iterative:
+    """The paper's modified Newton–Raphson, eq. 10, with the exact Hessian and no safeguard."""
+    return Iterative(NewtonEq10(rtol=tolerance, atol=tolerance), 200)
+
+
+@functools.cache
+def nelder_mead(tolerance: float = 1e-9) -> Iterative:
+    """The paper's simplex search, section 4.2."""
+    return Iterative(NelderMead(tolerance), 20_000)
+
+
+@functools.cache
+def gradient(tolerance: float = 1e-9) -> Iterative:
+    """First derivatives alone: optax's L-BFGS."""
+    return Iterative(optx.OptaxMinimiser(optax.lbfgs(), rtol=tolerance, atol=tolerance), 500)
+
+
+@functools.cache
+def mekf() -> Filtered:
+    """The paper's modified extended Kalman filter with square roots."""
+    return Filtered(ModifiedKalmanFilter)
+
+
+@functools.cache
+def ekf() -> Filtered:
+    """The plain extended Kalman filter of state and parameters."""
+    return Filtered(ExtendedKalmanFilter)
+
+
+METHODS = {
+    "newton_eq10": newton_eq10,
+    "newton": newton,
+    "gauss_newton": gauss_newton,
+    "nelder_mead": nelder_mead,
+    "gradient": gradient,
+    "ekf": ekf,
+    "mekf": mekf,
+}
