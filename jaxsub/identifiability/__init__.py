@@ -1,5 +1,31 @@
 """Identifiability: which coefficients, and which combinations of them, the recordings determine."""
 
-from .rank import Identifiability, identifiability
+from .coloured import Coloured, coloured_covariance
+from .design import Design, design, keeping
+from .design_information import Information, information
+from .design_limits import Limits
+from .disturbance import Disturbance
+from .equivalence import Equivalent, Family, equivalent_systems
+from .profile import Profile, profile
+from .rank import Identifiability, Verdict, identifiability, identifiable_subset
 
-__all__ = ["Identifiability", "identifiability"]
+__all__ = [
+    "Coloured",
+    "Design",
+    "Disturbance",
+    "Equivalent",
+    "Family",
+    "Identifiability",
+    "Information",
+    "Limits",
+    "Profile",
+    "Verdict",
+    "coloured_covariance",
+    "design",
+    "equivalent_systems",
+    "identifiability",
+    "identifiable_subset",
+    "information",
+    "keeping",
+    "profile",
+]

@@ -1,58 +1,195 @@
-r"""What the recordings say about the coefficients: rank, and the directions in which they say nothing.
-
-With $I$ the Fisher information of the free coefficients and $D = \mathrm{diag}(|\theta_i|)$, the eigenvectors of $DID$
-are relative changes of the coefficients taken together and its eigenvalues $\lambda$ how sharply the recordings tell
-them: a direction is known to $1/\sqrt\lambda$ of the coefficients' own sizes. Above 1 it is not known at all.
-"""
+"""What the recordings say about each coefficient, why they say no more, and what would help."""
 
 import dataclasses
+from typing import Literal
 
 import numpy as np
 
 from ..estimate import Fit
+from .directions import FRACTION, Directions, subset
+from .equivalence import Family, equivalent_systems
+from .excitation import Excitation
 
-_UNKNOWN = 1.0
-_SHOWN = 0.15
+_SHOWN, _PARTNERS, _SHARE, _NAMED = 0.15, 5, 0.2, 3
+Kind = Literal["identified", "only in combination", "not excited"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """What the recordings say about one coefficient.
+
+    **Fields**
+
+    - `kind`: `identified`: its standard error is below half its size. `only in combination`: it would be if others were
+      known. `not excited`: it would not be even then.
+    - `relative_error`: standard error in its own size, infinite where nothing bounds it.
+    - `partners`: the coefficients that it may drift with, the strongest first.
+    - `structural`: whether equivalent systems are the reason, so that no input helps.
+    - `remedy`: what would identify it, empty where nothing is needed.
+    """
+
+    name: str
+    kind: Kind
+    relative_error: float
+    partners: tuple[str, ...] = ()
+    structural: bool = False
+    remedy: str = ""
+
+    def sentence(self) -> str:
+        """The verdict in words."""
+        known = "unbounded" if not np.isfinite(self.relative_error) else f"known to {self.relative_error:.0%}"
+        if self.kind == "identified":
+            return f"{self.name}: identified, {known}."
+        with_ = f" with {', '.join(self.partners)}" if self.partners else ""
+        return f"{self.name}: {self.kind}{with_}, {known}; {self.remedy}."
 
 
 @dataclasses.dataclass(frozen=True)
 class Identifiability:
-    """Rank of the scaled Jacobian at the level of the noise, and its null directions.
+    """Rank of the scaled Jacobian at the level of the noise, its null directions, and a verdict on each coefficient.
 
     **Fields**
 
     - `rank`, `parameters`: directions the recordings determine, and free parameters.
     - `null_directions`: for each direction left open, the relative change of each coefficient that matters in it.
     - `uncertainty`: of each direction, in the coefficients' own sizes, the worst first.
+    - `verdicts`: one a coefficient. `families`: the equivalent systems behind them, none where no direction is open.
     """
 
     rank: int
     parameters: int
     null_directions: list[dict[str, float]]
     uncertainty: list[float]
+    verdicts: tuple[Verdict, ...] = ()
+    families: tuple[Family, ...] = ()
 
     def sentences(self) -> list[str]:
-        """The verdict in words, a line each."""
+        """The verdict in words, a line each: rank, open directions, then the coefficients that are not identified."""
         lines = [f"The recordings determine {self.rank} of {self.parameters} directions of the free coefficients."]
         for direction, spread in zip(self.null_directions, self.uncertainty, strict=False):
             terms = " ".join(f"{share:+.2f}·Δ{name}/{name}" for name, share in direction.items())
-            lines.append(f"Open to {spread:.0%} of their size: {terms}")
-        return lines
+            wide = f"Open to {spread:.0%} of their size" if np.isfinite(spread) else "Open without limit"
+            lines.append(f"{wide}: {terms}")
+        return lines + [verdict.sentence() for verdict in self.verdicts if verdict.kind != "identified"]
 
 
 def identifiability(fit: Fit) -> Identifiability:
-    """The directions that a fit's recordings leave open."""
-    values = np.array([fit.values[name] for name in fit.names])
-    if not len(values):
+    """The directions that a fit's recordings leave open, and a verdict on each coefficient."""
+    if not fit.names:
         return Identifiability(0, 0, [], [])
-    size = np.where(values == 0.0, np.sqrt(np.diag(np.asarray(fit.covariance))), np.abs(values))
-    relative = np.asarray(fit.covariance) / np.outer(size, size)
-    variances, directions = np.linalg.eigh(0.5 * (relative + relative.T))
-    order = np.argsort(-variances)
-    spread = np.sqrt(np.maximum(variances[order], 0.0))
-    open_ = [i for i, s in zip(order, spread, strict=True) if s > _UNKNOWN]
+    directions = Directions.of(fit)
+    open_ = np.flatnonzero(directions.open)
     null = []
-    for i in open_:
-        direction = directions[:, i] * np.sign(directions[np.argmax(np.abs(directions[:, i])), i])
-        null.append({n: round(float(d), 3) for n, d in zip(fit.names, direction, strict=True) if abs(d) > _SHOWN})
-    return Identifiability(len(values) - len(open_), len(values), null, spread.tolist())
+    for vector in directions.vectors.T[open_]:
+        vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
+        null.append({n: round(float(d), 3) for n, d in zip(fit.names, vector, strict=True) if abs(d) > _SHOWN})
+    families = tuple(equivalent_systems(fit.vehicle)) if len(open_) else ()
+    verdicts = _verdicts(fit, directions, families)
+    p = len(fit.names)
+    return Identifiability(p - len(open_), p, null, directions.uncertainty.tolist(), verdicts, families)
+
+
+def identifiable_subset(fit: Fit) -> tuple[str, ...]:
+    """Free coefficients to hold at their file values so that the rest is identified; added mass is held first."""
+    if not fit.names:
+        return ()
+    still = np.asarray(fit.vehicle.mass_matrix())
+    values = fit.vehicle.values()
+    moves = lambda name: np.any(np.asarray(fit.vehicle.with_values({name: values[name] + 1.0}).mass_matrix()) != still)
+    return subset(Directions.of(fit), tuple(name for name in fit.names if moves(name)))
+
+
+def _verdicts(fit: Fit, directions: Directions, families: tuple[Family, ...]) -> tuple[Verdict, ...]:
+    errors, alone = directions.relative_errors(), directions.alone()
+    if not (errors > FRACTION).any():
+        return tuple(Verdict(n, "identified", float(e)) for n, e in zip(fit.names, errors, strict=True))
+    rows = np.array([[f.coefficients.get(n, 0.0) for n in fit.names] for f in families]).reshape(-1, len(fit.names))
+    rows = rows / directions.size
+    pinned = directions.relative_errors(pinned=rows)
+    excitation = Excitation.of(fit)
+    made = []
+    for i, name in enumerate(fit.names):
+        error = float(errors[i])
+        if error <= FRACTION:
+            made.append(Verdict(name, "identified", error))
+            continue
+        mine = _mine(families, rows, i)
+        if not alone[i] <= FRACTION:
+            remedy = _more(name, alone[i], excitation) if np.isfinite(alone[i]) else _unseen(name, mine, excitation)
+            made.append(Verdict(name, "not excited", error, (), bool(mine), remedy))
+            continue
+        partners = _partners(directions, i)
+        remedies = [_break(mine, partners)] if mine else []
+        if pinned[i] > FRACTION:
+            remedies.append(_separate(directions, i, partners, rows if mine else rows[:0], excitation))
+        made.append(Verdict(name, "only in combination", error, partners, bool(mine), "; besides, ".join(remedies)))
+    return tuple(made)
+
+
+def _mine(families: tuple[Family, ...], rows: np.ndarray, index: int) -> list[Family]:
+    """The families in which the coefficient numbered `index` takes part, those that move it most first."""
+    if not len(families):
+        return []
+    share = np.abs(rows[:, index]) / np.abs(rows).max(axis=1)
+    return [families[i] for i in np.argsort(-share) if share[i] > 0.0]
+
+
+def _partners(directions: Directions, index: int) -> tuple[str, ...]:
+    """The coefficients that drift most when the one numbered `index` does."""
+    moves = np.abs(directions.moves(index))
+    moves[index] = 0.0
+    order = [j for j in np.argsort(-moves)[:_PARTNERS] if moves[j] > _SHARE * moves.max()]
+    return tuple(directions.names[j] for j in order)
+
+
+def _break(families: list[Family], partners: tuple[str, ...]) -> str:
+    """What breaks the families that a coefficient is in: no input does."""
+    read = tuple(dict.fromkeys(state for family in families for state in family.reinterpreted))
+    hold = f"hold {_one_of(partners)} at its known value or give it a prior"
+    measure = f"measure {' and '.join(read)}, or " if read else ""
+    leading = ", ".join(family.leading for family in families[:_NAMED])
+    return f"no input tells equivalent systems apart ({leading}): {measure}{hold}"
+
+
+def _unseen(name: str, families: list[Family], excitation: Excitation) -> str:
+    """What to do about a coefficient without any effect on what was recorded."""
+    if any(family.leading == name for family in families):
+        return (
+            f"nothing that is measured feels it, whatever the input: measure {_signals(name, excitation)}, or hold it"
+        )
+    return f"these recordings do not feel it: {excitation.how(name)}"
+
+
+def _signals(name: str, excitation: Excitation) -> str:
+    """The states that a coefficient multiplies, or the motion that it makes where it multiplies none."""
+    states = dict.fromkeys(signal.removesuffix("_dot") for signal in excitation.regressors[name])
+    return " and ".join(s for s in states if s not in excitation.inputs) or "the motion that it makes"
+
+
+def _more(name: str, alone: float, excitation: Excitation) -> str:
+    """How much more excitation a coefficient needs, even with all others known."""
+    rms = excitation.rms
+    seen = [f"{s} (rms {rms[s]:.2g})" if s in rms else s for s in excitation.regressors[name]]
+    larger = f"{' and '.join(seen) or 'the recording'} would have to be {alone / FRACTION:.1f} times as large"
+    return f"even with the others known {larger}: {excitation.how(name)}"
+
+
+def _separate(
+    directions: Directions, index: int, partners: tuple[str, ...], pinned: np.ndarray, excitation: Excitation
+) -> str:
+    """What separates a coefficient from those whose regressors run alongside its own in these recordings."""
+    name = directions.names[index]
+    error = lambda held: directions.relative_errors((directions.names.index(held),), pinned)[index]
+    left = {partner: error(partner) for partner in partners}
+    best = min(left, key=lambda partner: left[partner], default="")
+    signals = dict.fromkeys(s for n in (name, *partners[:1]) for s in excitation.regressors[n])
+    # a constant is told apart by what moves the other
+    moving = name if excitation.regressors[name] or not partners else partners[0]
+    apart = (f"move {' and '.join(signals)} independently: " if len(signals) > 1 else "") + excitation.how(moving)
+    if best and left[best] <= FRACTION:
+        return f"{apart}; or hold {best}, which leaves {left[best]:.0%}"
+    return apart + (f"; or hold {_one_of(partners, 'several')}" if best else "")
+
+
+def _one_of(names: tuple[str, ...], some: str = "one") -> str:
+    return f"{some} of {', '.join(names)}" if len(names) > 1 else "".join(names) or "it"

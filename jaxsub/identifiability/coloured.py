@@ -1,0 +1,102 @@
+r"""Standard errors when the residuals are coloured.
+
+The Cramér–Rao bound $D = (S^TR^{-1}S)^{-1}$ takes the residuals for white noise. With residuals of covariance Γ the
+estimate that minimised their squares scatters by (Maine and Iliff 1981; Klein and Morelli 2006, ch. 5)
+
+$\mathrm{Cov} = D\,\Big[\sum_{i,j} S_i^T R^{-1}\,\Gamma_{ij}\,R^{-1} S_j\Big]\,D.$
+
+They take $\Gamma_{ij}$ for the autocorrelation $R_{vv}(i-j)$ of the residuals. For a vehicle running free over tens of
+seconds it is no function of i - j, since heading and depth integrate, and the fit has removed the slowest part of it:
+nominal 95 % intervals then cover about 70 %. Here Γ is that of disturbance forces seen through the linearised model.
+Initial states are eliminated; priors count as observations of their own precision.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..estimate import Fit, Problem
+from ..likelihood import Linearised, force_columns
+from .disturbance import Disturbance, Whitened, carried, estimate_disturbance
+
+
+class Coloured(eqx.Module):
+    """The scatter of a fit's coefficients under the disturbance that its residuals show.
+
+    **Fields**
+
+    - `covariance`: (p, p), physical units. `disturbance`: the forces and the noise that explain the residuals.
+    - `names`: of the coefficients.
+    """
+
+    covariance: Float[Array, "p p"]
+    disturbance: Disturbance
+    names: tuple[str, ...] = eqx.field(static=True)
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard errors by name, physical units."""
+        return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
+
+
+def coloured_covariance(fit: Fit) -> Coloured:
+    """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed."""
+    covariance, disturbance = _corrected(fit.problem, fit.model)
+    return Coloured(covariance, disturbance, fit.names)
+
+
+@eqx.filter_jit
+def _corrected(problem: Problem, model: Linearised) -> tuple[Float[Array, "p p"], Disturbance]:
+    theta, start, residual = whitened_columns(problem, model)
+    precision = problem.prior_std**-2.0
+    own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(start.shape[3])
+    gain = jnp.linalg.solve(own, jnp.einsum("rkcs,rkcp->rsp", start, theta))
+    # what is left of the columns once the initial states have followed, and what their priors then say
+    left = theta - start @ gain[:, None]
+    gram = lambda columns: jnp.einsum("...a,...b->ab", columns, columns)
+    pinned = gram(gain) + jnp.diag(precision)
+    basis, untold = _directions(gram(left) + pinned)
+    values = problem.vehicle.values()
+    at = [values[row.name] for row in problem.vehicle.layout.free]
+    away = problem.prior_mean - jnp.stack(at) if at else jnp.zeros(0)
+    pulled = jnp.column_stack([away, basis])
+    prior = pulled.T @ (precision[:, None] * pulled)
+    # a direction that nothing tells has an empty column, and must not make the matrix of the others singular
+    empty = jnp.all(basis == 0.0, axis=0)
+    prior = prior.at[1:, 1:].add(jnp.diag(jnp.where(empty, 1.0, 0.0)))
+    measured = problem.runs.mask
+    shown, intervals = measured / problem.sigma, problem.runs.steps[problem.runs.step_of]
+    C = model.C * shown[..., None]
+    data = Whitened(residual, theta @ basis, start, prior, model.A, model.G, C, intervals, measured)
+    disturbance = estimate_disturbance(data, _unit(model, shown, residual))
+    # D = basis basisᵀ, so that white noise alone gives D back
+    middle = basis.T @ (carried(disturbance, data, left) + pinned) @ basis
+    return basis @ middle @ basis.T + untold @ untold.T, disturbance
+
+
+def whitened_columns(problem: Problem, model: Linearised) -> tuple[Array, Array, Array]:
+    """Whitened sensitivities to the coefficients (physical) and to the initial states (in their spreads); residuals."""
+    weight = problem.runs.mask / problem.sigma
+    theta = model.theta * weight[..., None]
+    return theta, model.start * weight[..., None] * problem.spread, model.error / problem.sigma
+
+
+def _directions(information: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array, "p p"]]:
+    """Columns in which the information is the unit matrix, empty where it tells nothing, and the columns left out."""
+    size = jnp.sqrt(jnp.diag(information))
+    scale = jnp.where(size > 0.0, size, 1.0)
+    values, vectors = jnp.linalg.eigh(information / jnp.outer(scale, scale))
+    eps = jnp.finfo(values.dtype).eps
+    columns = vectors / jnp.sqrt(jnp.maximum(values, 50.0 * eps)) / scale[:, None]
+    told = values > 1e4 * eps
+    return jnp.where(told, columns, 0.0), jnp.where(told, 0.0, columns)
+
+
+def _unit(model: Linearised, shown: Array, residual: Array) -> Float[Array, " n"]:
+    """A force in each equation whose lasting effect is as large as the residuals: where to start looking."""
+    n = model.G.shape[3] // 2
+    steady = jnp.broadcast_to(jnp.eye(n), (*model.G.shape[:2], n, n))
+    response = force_columns(model, steady, steady) * shown[..., None]
+    effect = jnp.sqrt(jnp.sum(response**2, (0, 1, 2)))
+    return jnp.sqrt(jnp.sum(residual**2)) / jnp.where(effect > 0.0, effect, 1.0)
