@@ -1,0 +1,43 @@
+"""Filters of a vehicle that are told no more than its sensors' noise."""
+
+from collections.abc import Callable
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..effects import CHANNEL_UNITS, VELOCITIES
+from ..vehicle import AbstractVehicle
+from .ekf import AbstractFilter
+from .mekf import ModifiedKalmanFilter
+from .noise import ConstantNoise
+from .vehicle import VehicleProcess
+
+# Process noise per root second in sensors' sigmas. At four samples a second filter I then averages some eight samples.
+# With much less it follows its model past the data, and filter II, which takes the state for corrected, corrects the
+# parameters for the same error again and again; with much more the sensors' noise acts as a regressor and biases them.
+DENSITY = 0.25
+# noise of a small AUV's usual sensors, for a state that nothing measures
+_USUAL = {"m/s": 0.01, "rad/s": 0.0035, "rad": 0.005, "m": 0.05}
+_PARTNERS = dict(zip("uvwpqr", ("x", "y", "z", "phi", "theta", "psi"), strict=True))
+
+
+def state_scale(vehicle: AbstractVehicle, sigma: Float[Array, " c"]) -> Float[Array, " s"]:
+    """For each state the noise of its channel, SI; else that of its rate or its integral over a second; else usual."""
+    layout = vehicle.layout
+    body = layout.kind == "submerged-body"
+    known = dict(zip(layout.channels, sigma, strict=True))
+    if "depth" in known:
+        known.setdefault("z", known["depth"])
+    rates = [VELOCITIES[e] if body else f"{e}_rate" for e in layout.equations]
+    partner = _PARTNERS if body else {f"{e}_rate": e for e in layout.equations}
+    partner = partner | {position: rate for rate, position in partner.items()}
+    usual = lambda name: jnp.asarray(_USUAL.get(CHANNEL_UNITS.get(name, ""), 1.0))
+    return jnp.stack([known.get(n, known.get(partner[n], usual(n))) for n in (*rates, *layout.positions)])
+
+
+def vehicle_filter(
+    process: VehicleProcess, sigma: Float[Array, " c"], kind: Callable[..., AbstractFilter] = ModifiedKalmanFilter
+) -> AbstractFilter:
+    """A filter of `process` with sensors of noise `sigma` (SI), the state's initial and process noise in its terms."""
+    scale = state_scale(process.vehicle, sigma)
+    return kind(process, ConstantNoise(jnp.diag(DENSITY * scale)), jnp.diag(sigma), jnp.diag(scale))

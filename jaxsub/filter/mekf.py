@@ -1,0 +1,48 @@
+r"""The modified extended Kalman filter: two filters in parallel (equations.md §4, the paper's section 5).
+
+I is the optimal Kalman filter of the state with $\hat\theta_{k-1}$ taken as known. II is the extended Kalman filter of
+$[x, \theta]$, linearised about ($\hat x$ of I, $\hat\theta_{k-1}$); it returns $\hat\theta_k$ to I, and what it makes
+of the state is not used. Source: Chui, Chen and Chui (1990), IEEE Trans. Automatic Control 35.
+"""
+
+import dataclasses
+
+from jaxtyping import Array, Float
+
+from .ekf import AbstractFilter, FilterState, augmented_predict, observed
+from .form import AbstractForm, SquareRoot
+from .model import AbstractProcess, Sample
+from .noise import AbstractNoiseRule, Residuals
+
+
+class ModifiedKalmanFilter(AbstractFilter):
+    """Filters I and II on one state: `own` is the uncertainty of I, `joint` that of II."""
+
+    process: AbstractProcess
+    noise: AbstractNoiseRule
+    R_root: Float[Array, "c c"]
+    x_root: Float[Array, "s s"]
+    form: AbstractForm = SquareRoot()
+
+    def own(self) -> Float[Array, "s s"]:
+        """Filter I starts with the same uncertainty of the state as filter II."""
+        return self.form.start(self.x_root)
+
+    def predict(self, state: FilterState, sample: Sample, G: Float[Array, "s m"]) -> FilterState:
+        """Both filters step from the same state and parameters."""
+        x, joint, F = augmented_predict(self, state, sample, G)
+        assert state.own is not None
+        return dataclasses.replace(state, x=x, joint=joint, own=self.form.predict(state.own, F, G))
+
+    def correct(self, state: FilterState, sample: Sample) -> tuple[FilterState, Float[Array, "c c"]]:
+        """I corrects the state and II the parameters, from one innovation."""
+        s = state.x.size
+        innovation, C = observed(self, state, sample)
+        assert state.own is not None
+        gain, factor, own = self.form.update(state.own, C[:, :s], self.R_root, sample.mask)
+        joint_gain, joint_factor, joint = self.form.update(state.joint, C, self.R_root, sample.mask)
+        correction = gain @ innovation
+        residuals = Residuals(innovation, sample.mask, factor, gain, correction)
+        x, theta = state.x + correction, state.theta + joint_gain[s:] @ innovation
+        after = dataclasses.replace(state, x=x, theta=theta, joint=joint, own=own, residuals=residuals)
+        return after, joint_factor

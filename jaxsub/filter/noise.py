@@ -1,0 +1,69 @@
+"""Process-noise rules: how much the state may stray from its model in a sample interval.
+
+A rule is asked once an interval. It sees what became of the last measurement and keeps a memory of its own, so that
+constant, random and adaptive noise enter the filters through one door.
+"""
+
+import abc
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+
+class Residuals(eqx.Module):
+    """What the last measurement did.
+
+    **Fields**
+
+    - `innovation`: (c,) zero where missing; `mask`: (c,) true where measured.
+    - `factor`: (c, c) lower-triangular factor of the innovation's covariance.
+    - `gain`: (s, c) of the state; `correction`: (s,) gain times innovation.
+    """
+
+    innovation: Float[Array, " c"]
+    mask: Bool[Array, " c"]
+    factor: Float[Array, "c c"]
+    gain: Float[Array, "s c"]
+    correction: Float[Array, " s"]
+
+    @classmethod
+    def none(cls, x: Float[Array, " s"], R_root: Float[Array, "c c"]) -> "Residuals":
+        """Those before the first measurement of a state like `x` by channels of noise `R_root`."""
+        c = len(R_root)
+        nothing = jnp.zeros(c, x.dtype)
+        return cls(nothing, jnp.zeros(c, bool), R_root, jnp.zeros((x.size, c), x.dtype), jnp.zeros_like(x))
+
+
+class AbstractNoiseRule(eqx.Module):
+    """A process-noise rule; its memory is any pytree of arrays whose shapes do not change."""
+
+    @abc.abstractmethod
+    def start(self) -> Any:
+        """The memory at the start of a run."""
+
+    @abc.abstractmethod
+    def __call__(self, memory: Any, residuals: Residuals, elapsed: Float[Array, ""]) -> tuple[Any, Float[Array, "s m"]]:
+        """The memory, and a square root of the covariance that the state gathers in the next `elapsed` seconds."""
+
+
+class ConstantNoise(AbstractNoiseRule):
+    """White noise: a square root that grows with the root of the time elapsed.
+
+    **Fields**
+
+    - `density`: (s, m) square root of the spectral density, state units per root second.
+    """
+
+    density: Float[Array, "s m"]
+
+    def start(self) -> tuple[()]:
+        """Nothing to remember."""
+        return ()
+
+    def __call__(
+        self, memory: tuple[()], residuals: Residuals, elapsed: Float[Array, ""]
+    ) -> tuple[tuple[()], Float[Array, "s m"]]:
+        """The density over the time elapsed."""
+        return memory, self.density * jnp.sqrt(elapsed)

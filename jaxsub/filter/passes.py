@@ -1,0 +1,67 @@
+"""Filters off-line: the on-line step scanned over runs, once or several times."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from .ekf import AbstractFilter, Estimate, FilterState
+from .model import Sample
+
+
+def over_runs(
+    filter: AbstractFilter, state: FilterState, samples: Sample, starts: Float[Array, "r s"]
+) -> tuple[FilterState, Estimate]:
+    """The state after R runs of K samples and what was known after each, (R, K) of them.
+
+    Every run starts from its own state of `starts`; the parameters and their covariance go from one run to the next.
+    """
+
+    def run(state: FilterState, part: tuple[Array, Sample]) -> tuple[FilterState, Estimate]:
+        start, sequence = part
+        following = lambda state, sample: filter.step(state, sample)
+        return jax.lax.scan(following, filter.restart(state, start), sequence)
+
+    return jax.lax.scan(run, state, (starts, samples))
+
+
+class Identified(eqx.Module):
+    """Parameters from a filter, of R runs of K samples.
+
+    **Fields**
+
+    - `theta`: (p,) after the last pass; `covariance`: (p, p) of that pass alone.
+    - `trace`: (passes, p) after each pass.
+    - `diverged`: whether the last pass did; then `theta` is where it broke down.
+    """
+
+    theta: Float[Array, " p"]
+    covariance: Float[Array, "p p"]
+    trace: Float[Array, "passes p"]
+    diverged: Bool[Array, ""]
+
+
+@eqx.filter_jit
+def identify(
+    filter: AbstractFilter,
+    samples: Sample,
+    starts: Float[Array, "r s"],
+    theta: Float[Array, " p"],
+    theta_root: Float[Array, "p p"] | None = None,
+    passes: int = 1,
+) -> Identified:
+    """Parameters from `passes` over the same runs; each run starts from its own state of `starts`.
+
+    Each pass takes its parameters from the one before and its uncertainty from `theta_root` again: data that were
+    counted once are not counted twice. `theta_root` is a square root of the covariance of `theta`, by default one: in a
+    `Transform`'s coordinates each parameter's own size, which holds back neither its sign nor its double.
+    """
+    root = jnp.eye(theta.size, dtype=theta.dtype) if theta_root is None else theta_root
+
+    def once(theta: Array, _: None) -> tuple[Array, tuple[Array, Array, Array]]:
+        state, _estimates = over_runs(filter, filter.start(starts[0], theta, root), samples, starts)
+        s = state.x.size
+        return state.theta, (state.theta, filter.form.covariance(state.joint)[s:, s:], state.diverged)
+
+    theta, (trace, covariance, diverged) = jax.lax.scan(once, theta, None, length=passes)
+    return Identified(theta, covariance[-1], trace, diverged[-1])

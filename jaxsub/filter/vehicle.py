@@ -1,0 +1,122 @@
+"""A vehicle as a process that filters follow: its state in SI, its free parameters in the estimator's coordinates."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..effects import AbstractActuator
+from ..errors import InputError
+from ..parameters import Transform
+from ..recording.runs import Runs
+from ..simulate import step_table
+from ..simulate.exponential import exponential_step
+from ..simulate.sampled import parabola
+from ..vehicle import AbstractVehicle
+from ..vehicle.base import stack
+from .model import AbstractProcess, Sample
+
+_ANGLES = ("phi", "theta", "psi")
+
+
+class Drive(eqx.Module):
+    """What a vehicle takes from a sample.
+
+    **Fields**
+
+    - `nodes`: (3, m) signals at the start, middle and end of the interval before it.
+    - `time`: s from the start of the run. `signals`: (m,) at the sample.
+    """
+
+    nodes: Float[Array, "*k 3 m"]
+    time: Float[Array, " *k"]
+    signals: Float[Array, "*k m"]
+
+
+class VehicleProcess(AbstractProcess):
+    r"""The sampled step of a vehicle and what its sensors show, $\theta$ the free parameters by `transform`.
+
+    **Fields**
+
+    - `vehicle`: what is not free. `transform`: between its free parameters and $\theta$.
+    - `substeps`: steps in each sample interval.
+
+    **Raises** `InputError` for an effect on an actuator, whose memory is no part of the vehicle's state.
+    """
+
+    vehicle: AbstractVehicle
+    transform: Transform
+    substeps: int = eqx.field(static=True, default=1)
+
+    def __check_init__(self):
+        for effect in self.vehicle.effects:
+            if isinstance(effect, AbstractActuator):
+                remedy = "filter without it, or fit by the output error"
+                raise InputError(self.vehicle.layout.name, f"a filter cannot hold the memory of {effect.label}", remedy)
+
+    @classmethod
+    def of(cls, vehicle: AbstractVehicle, substeps: int = 1) -> "VehicleProcess":
+        """`vehicle`, with coordinates about its free parameters."""
+        values = vehicle.values()
+        theta = np.array([float(values[row.name]) for row in vehicle.layout.free])
+        return cls(vehicle, Transform.of(vehicle.layout.free, theta), substeps)
+
+    def coordinates(self) -> Float[Array, " p"]:
+        """The coordinates of the vehicle's own free parameters."""
+        values = self.vehicle.values()
+        return self.transform.to_free(jnp.asarray([values[row.name] for row in self.vehicle.layout.free]))
+
+    def vehicle_at(self, theta: Float[Array, " p"]) -> AbstractVehicle:
+        """The vehicle whose free parameters have the coordinates `theta`."""
+        names = [row.name for row in self.vehicle.layout.free]
+        return self.vehicle.with_values(dict(zip(names, self.transform.to_physical(theta), strict=True)))
+
+    def step(self, x: Float[Array, " s"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " s"]:
+        """The sampled step for these parameters.
+
+        Its value is that of `Sampled`. Its derivative by the parameters is good to the scheme's order: they move the
+        linear part as a force and not through the matrix exponential, whose derivatives would cost more than all else.
+        """
+        vehicle = self.vehicle_at(theta)
+        inverse = jnp.linalg.inv(vehicle.mass_matrix())
+        linear = inverse @ vehicle.damping_matrix()
+        frozen = jax.lax.stop_gradient(linear)
+        weights = step_table(frozen, sample.elapsed[None] / self.substeps).at(jnp.asarray(0))
+        n = linear.shape[0]
+
+        @jax.jit
+        def rates(velocity: Array, position: Array, node: Array) -> tuple[Array, Array]:
+            motion = vehicle.motion(jnp.concatenate([velocity, position]), node)
+            moved = stack(vehicle.position_rates(motion), vehicle.layout.positions, velocity[0])
+            return inverse @ vehicle.force(motion) + (linear - frozen) @ velocity, moved
+
+        def advance(carry: tuple[Array, Array], nodes: Array) -> tuple[tuple[Array, Array], None]:
+            return exponential_step(rates, weights, *carry, nodes), None
+
+        carry, _ = jax.lax.scan(advance, (x[:n], x[n:]), _pieces(sample.inputs.nodes, self.substeps))
+        return jnp.concatenate(carry)
+
+    def observe(self, x: Float[Array, " s"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " c"]:
+        """The vehicle's outputs."""
+        return self.vehicle_at(theta).measure(sample.inputs.time, x, sample.inputs.signals)
+
+    def innovation(self, measured: Float[Array, " c"], expected: Float[Array, " c"]) -> Float[Array, " c"]:
+        """The difference; angles of a body wrapped to (-π, π]."""
+        difference = measured - expected
+        layout = self.vehicle.layout
+        turns = jnp.array([c in _ANGLES and layout.kind == "submerged-body" for c in layout.channels])
+        return jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
+
+
+def _pieces(nodes: Float[Array, "3 m"], parts: int) -> Float[Array, "q 3 m"]:
+    """Nodes of `parts` equal pieces of the interval, on the parabola through the three given."""
+    middles = parabola(jnp.arange(2 * parts + 1, dtype=nodes.dtype) / (2.0 * parts)) @ nodes
+    return jnp.stack([middles[:-2:2], middles[1:-1:2], middles[2::2]], axis=1)
+
+
+def samples(runs: Runs) -> Sample:
+    """The samples of `runs`, (R, K) of them, as a `VehicleProcess` takes them."""
+    first = lambda rest: jnp.concatenate([jnp.zeros_like(rest[:, :1]), rest], axis=1)
+    elapsed = first(jnp.where(runs.live, runs.steps[runs.step_of], 0.0))
+    return Sample(Drive(first(runs.nodes()), runs.times, runs.signals), elapsed, runs.outputs, runs.mask)
