@@ -9,6 +9,8 @@ import click
 from ..errors import InputError
 
 _PATH = click.Path(path_type=Path)
+# said here and not asked of `estimate`, so that `--help` needs no jax; a test holds the two together
+METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
 _overwrite = click.option("--overwrite", is_flag=True, help="Replace what is at --out.")
@@ -39,13 +41,13 @@ def demo(out: Path, seed: int, overwrite: bool) -> None:
 @_vehicle
 @_runs
 @_out(required=True)
-@click.option("--method", type=click.Choice(["gauss-newton"]), default="gauss-newton", show_default=True)
+@click.option("--method", type=click.Choice(METHODS), default=METHODS[0], show_default=True)
 @_overwrite
 def identify(vehicle: Path, runs: tuple[Path, ...], out: Path, method: str, overwrite: bool) -> None:
     """Estimate the free coefficients, with standard errors and identifiability."""
     from . import identify as command
 
-    command.run(vehicle, runs, out, overwrite)
+    command.run(vehicle, runs, out, method, overwrite)
 
 
 @app.command()

@@ -1,69 +1,90 @@
 """`jaxsub identify`: coefficients with standard errors, and what the recordings leave open."""
 
 import csv
+import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
 from ..discrepancy import batch
 from ..errors import InputError
-from ..estimate import Fit, fit
-from ..identifiability import Identifiability, identifiability
+from ..estimate import METHODS, Fit, fit
+from ..identifiability import Coloured, Identifiability, Verdict, coloured_covariance, identifiability
 from ..results import RESULTS
 from ..vehicle import read_vehicle, write_vehicle
 from . import session
 from .output import fresh_folder, refuse_existing
 
 
-def run(vehicle_path: Path, runs: Sequence[Path], out: Path, overwrite: bool) -> None:
-    """Fit the vehicle to the recordings; write `fitted.toml`, `coefficients.csv` and `identification.json`."""
+def run(vehicle_path: Path, runs: Sequence[Path], out: Path, method: str, overwrite: bool) -> None:
+    """Fit the vehicle to the recordings by `method`; write `fitted.toml`, `coefficients.csv`, `identification.json`."""
     session.start()
     refuse_existing(out, overwrite)
     vehicle = read_vehicle(vehicle_path)
     recordings = session.load_runs(runs, vehicle)
-    with fresh_folder(out, overwrite) as folder:
-        with session.progress(f"identifying {vehicle.layout.name}") as told:
-            told("fitting")
-            found = fit(vehicle, batch(vehicle, recordings))
-        if bool(found.result == RESULTS.nan_start):
-            raise InputError(
-                str(vehicle_path), "the model does not run from these values", "give values that are closer"
-            )
-        said = identifiability(found)
-        _write(found, said, folder)
-    _show(found, said)
+    with fresh_folder(out, overwrite) as folder, session.progress(f"identifying {vehicle.layout.name}") as told:
+        told(f"fitting by {method}")
+        found = fit(vehicle, batch(vehicle, recordings), method=METHODS[method.replace("-", "_")]())
+        if not np.isfinite(float(found.cost)):
+            what = "the model does not run from these values"
+            raise InputError(str(vehicle_path), what, "give values that are closer, or another --method")
+        told("asking what the recordings identify")
+        said, coloured = identifiability(found), coloured_covariance(found)
+        _write(found, said, coloured, method, folder)
+    _show(found, said, coloured)
 
 
-def _write(found: Fit, said: Identifiability, folder: Path) -> None:
+def _write(found: Fit, said: Identifiability, coloured: Coloured, method: str, folder: Path) -> None:
     write_vehicle(found.vehicle, folder / "fitted.toml", "fitted by jaxsub")
     units = {row.name: row.unit for row in found.vehicle.layout.free}
     with (folder / "coefficients.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
-        table.writerow(["name", "value", "standard_error", "unit"])
-        errors = found.standard_errors
-        table.writerows([name, value, errors[name], units[name]] for name, value in found.values.items())
+        table.writerow(["name", "value", "standard_error", "unit", "standard_error_coloured", "verdict"])
+        white, wide = found.standard_errors, coloured.standard_errors
+        kind = {verdict.name: verdict.kind for verdict in said.verdicts}
+        table.writerows([n, v, white[n], units[n], wide[n], kind[n]] for n, v in found.values.items())
     content = {
         "schema": 1,
+        "method": method,
         "result": "successful" if bool(found.result == RESULTS.successful) else RESULTS[found.result],
         "cost": float(found.cost),
         "gradient_norm": float(found.gradient_norm),
         "steps": int(found.steps),
         "fit": found.rms,
         "identifiability": {
-            "rank": said.rank, "parameters": said.parameters, "null_directions": said.null_directions
+            "rank": said.rank,
+            "parameters": said.parameters,
+            "null_directions": said.null_directions,
+            "equivalent_systems": [family.sentence() for family in said.families],
+            "verdicts": [_plain(verdict) for verdict in said.verdicts],
         },
-        "coefficients": {n: {"value": v, "standard_error": found.standard_errors[n]} for n, v in found.values.items()},
-    }  # fmt: skip
+        "coefficients": {
+            n: {"value": v, "standard_error": white[n], "standard_error_coloured": wide[n]}
+            for n, v in found.values.items()
+        },
+    }
     (folder / "identification.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
-def _show(found: Fit, said: Identifiability) -> None:
+def _plain(verdict: Verdict) -> dict:
+    """A verdict as JSON has it, which knows no infinity."""
+    told = dataclasses.asdict(verdict)
+    return told | {"relative_error": verdict.relative_error if np.isfinite(verdict.relative_error) else None}
+
+
+def _show(found: Fit, said: Identifiability, coloured: Coloured) -> None:
     for sentence in said.sentences():
         session.console.print(sentence, highlight=False, markup=False)
-    table = Table("coefficient", "value", "standard error")
+    table = Table("coefficient", "value", "standard error", "if residuals are coloured", "the recordings")
+    white, wide = found.standard_errors, coloured.standard_errors
+    kind = {verdict.name: verdict.kind for verdict in said.verdicts}
     for name, value in found.values.items():
-        table.add_row(escape(name), f"{value:.6g}", f"{found.standard_errors[name]:.2g}")
+        table.add_row(escape(name), f"{value:.6g}", f"{white[name]:.2g}", f"{wide[name]:.2g}", kind[name])
     session.console.print(table)
+    if not bool(found.result == RESULTS.successful):
+        away = f"{float(found.gradient_norm):.2g} standard errors from the optimum"
+        session.console.print(f"Not converged: {RESULTS[found.result]} It is {away}.", highlight=False, markup=False)

@@ -1,5 +1,7 @@
 """Estimation by filters: parameters and state together, sample after sample."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,8 +14,12 @@ from ..filter.mekf import ModifiedKalmanFilter
 from ..filter.passes import identify
 from ..filter.vehicle import VehicleProcess, samples
 from ..results import RESULTS
-from .method import AbstractMethod, Found, costs, lanes_for, over_cores, problems
+from .damped import Damped
+from .method import AbstractMethod, Found, costs, lanes_for, objective, over_cores, problems
+from .pool import pool
 from .problem import Problem
+
+_SETTLED, _STEPS = 1e-5, 20
 
 
 class Filtered(AbstractMethod):
@@ -31,7 +37,7 @@ class Filtered(AbstractMethod):
 
     kind: type[AbstractFilter] = eqx.field(static=True, default=ModifiedKalmanFilter)
     spread: float = 1.0
-    passes: int = eqx.field(static=True, default=3)
+    passes: int = eqx.field(static=True, default=2)
 
     def run(
         self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
@@ -58,6 +64,11 @@ def _filtered(method: Filtered, problem: Problem, starts: Array, outputs: Array 
         return y.at[:p].set(found.theta), found.diverged
 
     y, diverged = jax.lax.map(one, (jnp.arange(len(starts)), starts), batch_size=lanes)
+    if not problem.known_start:
+        # a filter needs no initial state; the likelihood does, and the one that suits its parameters is meant
+        still = jnp.zeros(p, bool)
+        settled = lambda index: dataclasses.replace(of(index), origin=y[index, :p], moving=still)
+        y = pool(Damped(Problem.expand, _SETTLED), objective, y, settled, lanes=lanes, max_steps=_STEPS).y
     good, lost = RESULTS.promote(optx.RESULTS.successful), RESULTS.promote(optx.RESULTS.nonfinite)
     result = jax.vmap(lambda gone: RESULTS.where(gone, lost, good))(diverged)
     return Found(y, costs(of, y, lanes), jnp.full(len(starts), method.passes), result)
