@@ -27,7 +27,7 @@ def run(out: Path, quick: bool) -> dict:
     """Coverage over repeated experiments on scenario II, raw and corrected."""
     vehicle = setup.truth()
     problem = setup.problem(vehicle, setup.recordings(2, 1))
-    white, coloured = (40, 6) if quick else (1000, 120)
+    white, coloured = (40, 6) if quick else (1000, 60)
     results = {"nominal": 0.95, "white": white_noise(problem, white), "coloured": disturbed(problem, coloured)}
     coverages(results, out / "coverage.png")
     return results

@@ -6,6 +6,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
+from jaxsub.cli import session
 from jaxsub.estimate import METHODS, Chain, Global, basins, gauss_newton, mekf, scattered, success
 
 from . import setup
@@ -33,6 +34,7 @@ def run(out: Path, quick: bool) -> dict:
             begin = time.perf_counter()
             found[name] = jax.block_until_ready(method.run(problem, starts[:count]))
             lines[name] = line(problem, found[name], best) | {"seconds": time.perf_counter() - begin}
+            session.console.print(f"±{spread:.0%} {name}: {lines[name]['success']}", highlight=False)
         cost = np.asarray(found["gauss_newton"].cost)
         failed = np.flatnonzero(~(cost < best + 0.1))[: 4 if quick else COUNTS["global"]]
         if len(failed):
