@@ -1,5 +1,8 @@
 """What every test starts from: 64-bit numbers, annotated shapes checked at each call, compiled code kept."""
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import jax
 import jaxtyping
 import pytest
@@ -8,8 +11,20 @@ jax.config.update("jax_enable_x64", True)
 # Before any test imports jaxsub, since only modules imported later are checked.
 jaxtyping.install_import_hook("jaxsub", "typechecking.checked")
 
+_MAPS = Path("/proc/self/maps")
+# a process may have 65 530 memory maps on Linux, compiled programs take a few each, and without one more it dies
+_MANY = 30_000
+
 
 def pytest_configure(config: pytest.Config) -> None:
     if cache := getattr(config, "cache", None):
         jax.config.update("jax_compilation_cache_dir", str(cache.mkdir("jax")))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+
+
+@pytest.fixture(autouse=True)
+def room_for_programs() -> Iterator[None]:
+    """Compiled programs are let go of before there are too many."""
+    yield
+    if _MAPS.exists() and _MAPS.read_bytes().count(b"\n") > _MANY:
+        jax.clear_caches()

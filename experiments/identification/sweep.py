@@ -1,5 +1,6 @@
 """Monte-Carlo over initial guesses: how often each estimator reaches the global optimum of scenario II."""
 
+import json
 import time
 from pathlib import Path
 
@@ -7,45 +8,51 @@ import jax
 import numpy as np
 
 from jaxsub.cli import session
-from jaxsub.estimate import METHODS, Chain, Global, basins, gauss_newton, mekf, scattered, success
+from jaxsub.estimate import METHODS, AbstractMethod, Chain, Global, basins, gauss_newton, mekf, scattered, success
 
 from . import setup
 from .figures import rates
 
-SEED = 3
+SEED, MARGIN = 3, 0.1
 # how many starts each estimator is given: as many as minutes allow
-COUNTS = {"gauss_newton": 1000, "mekf": 1000, "ekf": 1000, "newton_eq10": 200, "newton": 200, "gradient": 48}
-COUNTS |= {"nelder_mead": 48, "mekf_then_gauss_newton": 1000, "global": 24}
-QUICK = 16
+COUNTS = {"gauss_newton": 1000, "mekf_then_gauss_newton": 1000, "mekf": 200, "ekf": 200}
+COUNTS |= {"global_where_gauss_newton_failed": 8, "nelder_mead": 16, "newton_eq10": 32, "newton": 32, "gradient": 8}
+QUICK = 8
 
 
 def run(out: Path, quick: bool) -> dict:
-    """Success rates with intervals from ±50 % and ±100 %, basins, and what the global search does with the failures."""
+    """Success rates with intervals from ±50 % and ±100 %, basins, and what the global search does with the failures.
+
+    Every line is kept as soon as it is known, so that an interrupted sweep goes on where it stopped.
+    """
     problem = setup.problem(setup.truth(), setup.recordings(2, 1))
     best = float(gauss_newton(1e-10).run(problem, scattered(problem, 0.2, 1, SEED)).cost[0])
-    methods = {name: method() for name, method in METHODS.items()}
-    methods["mekf_then_gauss_newton"] = Chain(mekf(), gauss_newton())
-    results = {}
-    for spread in (0.5, 1.0):
-        starts = scattered(problem, spread, max(COUNTS.values()), SEED)
-        found, lines = {}, {}
-        for name, method in methods.items():
-            count = min(COUNTS[name], QUICK if quick else COUNTS[name])
+    kept = out / "parts" / "sweep_lines.json"
+    results = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {"50%": {}, "100%": {}}
+    for name, count in COUNTS.items():
+        for spread, lines in results.items():
+            starts = scattered(problem, float(spread[:-1]) / 100.0, max(COUNTS.values()), SEED)
+            if name in lines:
+                continue
+            chosen = starts
+            if name.startswith("global"):
+                chosen = starts[np.asarray(lines["gauss_newton"]["failed"], int)]
+            chosen = chosen[: min(count, QUICK) if quick else count]
+            if not len(chosen):
+                continue
             begin = time.perf_counter()
-            found[name] = jax.block_until_ready(method.run(problem, starts[:count]))
-            lines[name] = line(problem, found[name], best) | {"seconds": time.perf_counter() - begin}
-            session.console.print(f"±{spread:.0%} {name}: {lines[name]['success']}", highlight=False)
-        cost = np.asarray(found["gauss_newton"].cost)
-        failed = np.flatnonzero(~(cost < best + 0.1))[: 4 if quick else COUNTS["global"]]
-        if len(failed):
-            begin = time.perf_counter()
-            rescued = Global(gauss_newton(), span=1.0).run(problem, starts[failed])
-            lines["global_where_gauss_newton_failed"] = line(problem, rescued, best) | {
-                "seconds": time.perf_counter() - begin
-            }
-        results[f"{spread:.0%}"] = lines
+            found = jax.block_until_ready(_method(name).run(problem, chosen))
+            lines[name] = line(problem, found, best) | {"seconds": time.perf_counter() - begin}
+            kept.write_text(json.dumps(results), encoding="utf-8")
+            session.console.print(f"±{spread} {name}: {lines[name]['success']}", highlight=False)
     rates(results, out / "sweep.png")
-    return {"scenario": 2, "best_cost": best, "success_margin_in_cost": 0.1, "spread": results}
+    return {"scenario": 2, "best_cost": best, "success_margin_in_cost": MARGIN, "spread": results}
+
+
+def _method(name: str) -> AbstractMethod:
+    if name == "mekf_then_gauss_newton":
+        return Chain(mekf(), gauss_newton())
+    return Global(gauss_newton(), span=1.0) if name.startswith("global") else METHODS[name]()
 
 
 def line(problem, found, best: float) -> dict:
@@ -53,8 +60,9 @@ def line(problem, found, best: float) -> dict:
     clusters, lost = basins(problem, found)
     cost = np.asarray(found.cost)
     return {
-        "success": success(found, best).to_json(),
+        "success": success(found, best, MARGIN).to_json(),
         "starts": len(cost),
+        "failed": np.flatnonzero(~(cost < best + MARGIN)).tolist(),
         "not_finite": lost,
         "below_the_best_known": float(min(0.0, np.nanmin(cost) - best)),
         "basins": [{"cost": basin.cost, "count": basin.count} for basin in clusters[:5]],

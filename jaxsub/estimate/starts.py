@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -20,7 +21,7 @@ def scattered(problem: Problem, spread: float, count: int, seed: int) -> Float[A
     centre = np.asarray(problem.transform.to_physical(problem.origin))
     draws = np.random.default_rng(seed).uniform(-spread, spread, (count, len(centre)))
     starts = jnp.asarray(centre * (1.0 + draws))
-    return jnp.stack([problem.at(theta) for theta in starts])
+    return jax.vmap(problem.at)(starts)
 
 
 @dataclasses.dataclass(frozen=True)
