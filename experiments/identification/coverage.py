@@ -19,16 +19,19 @@ from . import setup
 from .figures import coverages
 
 Z95, SEED = 1.959964, 11
-# a disturbance force in every equation: its time constant (s), and its size beside the rms of the equation's own forces
-TIME, SHARE = 3.0, 0.33
+# disturbance forces in every equation: their time constant (s), and experiments by their size beside the rms of the
+# equation's own forces
+TIME, EXPERIMENTS = 3.0, {0.1: 40, 0.33: 60}
 
 
 def run(out: Path, quick: bool) -> dict:
     """Coverage over repeated experiments on scenario II, raw and corrected."""
     vehicle = setup.truth()
     problem = setup.problem(vehicle, setup.recordings(2, 1))
-    white, coloured = (40, 6) if quick else (1000, 60)
-    results = {"nominal": 0.95, "white": white_noise(problem, white), "coloured": disturbed(problem, coloured)}
+    results = {"nominal": 0.95, "white": white_noise(problem, 40 if quick else 1000)}
+    results["coloured"] = {
+        f"{share:g}": disturbed(problem, 5 if quick else count, share) for share, count in EXPERIMENTS.items()
+    }
     coverages(results, out / "coverage.png")
     return results
 
@@ -50,12 +53,12 @@ def white_noise(problem: Problem, count: int) -> dict:
     }
 
 
-def disturbed(problem: Problem, count: int) -> dict:
-    """The same with a disturbance force in every equation: standard errors as for white residuals, and corrected."""
+def disturbed(problem: Problem, count: int, share: float) -> dict:
+    """The same with disturbance forces of that `share`: standard errors as for white residuals, and corrected."""
     rng = np.random.default_rng(SEED + 1)
     names = [row.name for row in problem.vehicle.layout.free]
     truth = np.array([float(problem.vehicle.values()[name]) for name in names])
-    size, raw, corrected, spent = force_size(problem), [], [], []
+    size, raw, corrected, spent = share * force_size(problem), [], [], []
     method, lost = gauss_newton(), 0
     for _ in range(count):
         force = gauss_markov(rng, problem, size)
@@ -80,7 +83,7 @@ def disturbed(problem: Problem, count: int) -> dict:
     return {
         "experiments": count,
         "failed": lost,
-        "disturbance": {"time_constant_s": TIME, "share_of_the_rms_force": SHARE, "rms_by_equation": size.tolist()},
+        "disturbance": {"time_constant_s": TIME, "share_of_the_rms_force": share, "rms_by_equation": size.tolist()},
         "raw": _rate(np.array(raw)),
         "corrected": _rate(np.array(corrected)),
         "by_coefficient": dict(zip(names, np.mean(corrected, 0).tolist(), strict=True)),
@@ -108,12 +111,12 @@ def _standard_errors(problem: Problem, found: Found) -> Float[Array, "n p"]:
 
 
 def force_size(problem: Problem) -> np.ndarray:
-    """SHARE of the rms of all that is not linear damping in each equation, over the undisturbed runs."""
+    """The rms of all that is not linear damping in each equation, over the undisturbed runs."""
     vehicle, runs = problem.vehicle, problem.runs
     states = Sampled.of(vehicle, runs).states(runs, at_rest(vehicle, len(runs.times)))
     force = np.asarray(vehicle.force(vehicle.motion(states, runs.signals)))
     # what is constant, as thrust is, disturbs nothing
-    return SHARE * np.maximum(force.std((0, 1)), 1e-6)
+    return np.maximum(force.std((0, 1)), 1e-6)
 
 
 def gauss_markov(rng: np.random.Generator, problem: Problem, size: np.ndarray) -> np.ndarray:

@@ -99,16 +99,19 @@ def rates(results: Mapping[str, Mapping[str, dict]], path: Path) -> None:
 
 
 def coverages(results: Mapping, path: Path) -> None:
-    """Coverage of nominal 95 % intervals by coefficient, and over all, raw and corrected."""
+    """Coverage of nominal 95 % intervals by coefficient; uncorrected, over all, as lines."""
     names = list(results["white"]["by_coefficient"])
     figure, axis = plt.subplots(figsize=(8.5, 0.28 * len(names) + 2.2))
-    for kind, colour, marker in (("white", "#1f4e79", "o"), ("coloured", "#b5482a", "s")):
-        label = f"{kind}{', corrected' if kind == 'coloured' else ''}"
-        axis.plot(
-            [results[kind]["by_coefficient"][n] for n in names], range(len(names)), marker, color=colour, label=label
-        )
-    raw = results["coloured"]["raw"]["observed"]
-    axis.axvline(raw, color="#b5482a", ls=":", label=f"coloured, uncorrected, all: {raw:.0%}")
+    shown = {"white noise": results["white"]}
+    shown |= {f"disturbance of {share}, corrected": line for share, line in results["coloured"].items()}
+    for (label, line), colour, marker in zip(shown.items(), ("#1f4e79", "#e0a030", "#b5482a"), "o^s", strict=True):
+        shares = [line["by_coefficient"][name] for name in names]
+        axis.plot(shares, range(len(names)), marker, color=colour, label=label)
+        if "corrected" in label:
+            raw = line["raw"]["observed"]
+            axis.axvline(
+                raw, color=colour, ls=":", label=f"{label.replace('corrected', 'uncorrected, all')}: {raw:.0%}"
+            )
     axis.axvline(0.95, color="k", lw=0.8)
     axis.set_yticks(range(len(names)), names, fontsize=8)
     axis.invert_yaxis()

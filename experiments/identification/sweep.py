@@ -16,7 +16,7 @@ from .figures import rates
 SEED, MARGIN = 3, 0.1
 # how many starts each estimator is given: as many as minutes allow
 COUNTS = {"gauss_newton": 1000, "mekf_then_gauss_newton": 1000, "mekf": 200, "ekf": 200}
-COUNTS |= {"global_where_gauss_newton_failed": 8, "nelder_mead": 16, "newton_eq10": 32, "newton": 32, "gradient": 8}
+COUNTS |= {"global_where_gauss_newton_failed": 8, "newton_eq10": 24, "nelder_mead": 12, "newton": 16, "gradient": 6}
 QUICK = 8
 
 
