@@ -135,7 +135,12 @@ def drifts(cases: Sequence[tuple[dict, str, str, str]], path: Path) -> None:
         _, sizes, rows = np.linalg.svd(directions, full_matrices=False)
         reach = np.abs(ends[:, [i, j]]).max() * 100
         if np.sum(sizes > 1e-6 * sizes[0]) == 1:
-            axis.plot(*(np.outer([-reach, reach], rows[0]).T), color="#1f4e79", lw=1, label="predicted manifold")
+            axis.plot(
+                *(np.outer([-reach, reach], rows[0]).T),
+                color="#1f4e79",
+                lw=1,
+                label="predicted manifold through the truth",
+            )
         else:
             axis.text(0.03, 0.03, "the families fill this plane", transform=axis.transAxes, fontsize=8)
         axis.plot(0, 0, "k+", ms=12, label="truth")
