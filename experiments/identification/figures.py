@@ -94,7 +94,7 @@ def rates(results: Mapping[str, Mapping[str, dict]], path: Path) -> None:
     axis.invert_yaxis()
     axis.set_xlim(0, 1.12)
     axis.set_xlabel("share of starts that end at the global optimum (within 0.1 of its cost)")
-    axis.legend(fontsize=8, loc="lower right")
+    axis.legend(fontsize=8, loc="center")
     _save(figure, path)
 
 
