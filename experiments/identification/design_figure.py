@@ -25,7 +25,7 @@ _COLOURS = {"PRBS of the paper": "#9a9a9a", "design": "#b5482a"}
 def draw(path: Path, vehicle: AbstractVehicle, rows: Mapping[str, tuple[Recording, Information]]) -> None:
     """Write the picture of the manoeuvres `rows` of `vehicle` to `path`."""
     figure = plt.figure(figsize=(13.0, 9.0), layout="constrained")
-    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1.45, 1.0)))
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.45, 1.0))[0]
     axes = left.subplots(len(_PANELS), 1, sharex=True)
     for name, colour in _COLOURS.items():
         (answer,) = synthetic(vehicle, [rows[name][0]], seed=0, noise=False, states=sampled_states)

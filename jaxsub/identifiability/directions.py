@@ -57,6 +57,11 @@ class Directions:
         """(p,) whether each direction is left open."""
         return self.uncertainty > FRACTION
 
+    @property
+    def largest(self) -> float:
+        """The best known direction's information: the triangle's largest singular value."""
+        return float(np.linalg.norm(self.triangle, 2))
+
     def relative_errors(self, held: tuple[int, ...] = (), pinned: np.ndarray | None = None) -> np.ndarray:
         """(p,) standard error of each coefficient in its own size; infinite where rounding hides it.
 
@@ -65,17 +70,17 @@ class Directions:
         triangle = self.triangle
         if pinned is not None and len(pinned):
             # as if each had been observed a million times better than the best direction
-            weight = 1e6 * np.linalg.norm(triangle, 2)
+            weight = 1e6 * self.largest
             triangle = np.concatenate([triangle, weight * np.linalg.svd(pinned, full_matrices=False)[2]])
         kept = [i for i in range(len(self.names)) if i not in held]
-        vectors, uncertainty = _decompose(triangle[:, kept], np.linalg.norm(self.triangle, 2))
+        vectors, uncertainty = _decompose(triangle[:, kept], self.largest)
         errors = np.zeros(len(self.names))
         errors[kept] = _spread(vectors, uncertainty)
         return errors
 
     def alone(self) -> np.ndarray:
         """(p,) standard error of each coefficient in its own size if all the others were known."""
-        return _inverse(np.linalg.norm(self.triangle, axis=0), np.linalg.norm(self.triangle, 2))
+        return _inverse(np.linalg.norm(self.triangle, axis=0), self.largest)
 
     def moves(self, index: int) -> np.ndarray:
         """(p,) the relative change of each coefficient that the data would not notice in one of `index`, by 1."""
@@ -95,7 +100,7 @@ def subset(directions: Directions, inertial: tuple[str, ...]) -> tuple[str, ...]
     held: list[int] = []
     while True:
         kept = [i for i in range(len(directions.names)) if i not in held]
-        vectors, uncertainty = _decompose(directions.triangle[:, kept], np.linalg.norm(directions.triangle, 2))
+        vectors, uncertainty = _decompose(directions.triangle[:, kept], directions.largest)
         if not len(kept) or not uncertainty[0] > FRACTION:
             return tuple(directions.names[i] for i in sorted(held))
         share = np.abs(vectors[:, 0])

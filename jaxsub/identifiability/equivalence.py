@@ -78,9 +78,9 @@ def equivalent_systems(vehicle: AbstractVehicle) -> list[Family]:
     if not p:
         return []
     conditions = Conditions.of(vehicle)
-    triangle = np.linalg.qr(np.asarray(conditions.jacobian(jnp.zeros(conditions.width))), mode="r")
-    _, singular, rows = np.linalg.svd(triangle)
-    null = rows[np.sum(singular > np.sqrt(np.finfo(triangle.dtype).eps) * singular[0]) :]
+    jacobian = np.asarray(conditions.jacobian(jnp.zeros(conditions.width)))
+    _, singular, rows = np.linalg.svd(np.linalg.qr(jacobian, mode="r"))
+    null = rows[np.sum(singular > np.sqrt(np.finfo(jacobian.dtype).eps) * singular[0]) :]
     # a mere symmetry of the state changes no coefficient and is no family
     turned, sizes, _ = np.linalg.svd(null[:, :p], full_matrices=False)
     null = turned[:, sizes > _ZERO].T @ null
