@@ -10,10 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from jaxsub.estimate import Found, Problem, Rate, evaluate, gauss_newton, scattered
+from jaxsub.estimate import Found, Problem, Rate, gauss_newton, scattered
 from jaxsub.identifiability import coloured_covariance
-from jaxsub.simulate import Sampled, at_rest, simulate
-from jaxsub.vehicle import AbstractVehicle
+from jaxsub.simulate import Sampled, at_rest, measure, simulate
 
 from . import setup
 from .figures import coverages
@@ -41,7 +40,7 @@ def white_noise(problem: Problem, count: int) -> dict:
     clean = simulate(problem.vehicle, problem.runs, problem.guess)
     noise = np.random.default_rng(SEED).standard_normal((count, *clean.shape)) * np.asarray(problem.sigma)
     found = gauss_newton().run(problem, scattered(problem, 0.3, count, SEED), clean + jnp.asarray(noise))
-    error, claimed = np.asarray(_errors(problem, found)), np.asarray(_standard_errors(problem, found))
+    error, claimed = np.asarray(found.y - problem.coordinates()), np.asarray(_standard_errors(problem, found))
     names = [row.name for row in problem.vehicle.layout.free]
     inside, near = np.abs(error) < Z95 * claimed, np.abs(error) < 3.0 * claimed
     return {
@@ -65,15 +64,13 @@ def disturbed(problem: Problem, count: int, share: float) -> dict:
         shown = _pushed(problem, jnp.asarray(force))
         noise = rng.standard_normal(shown.shape) * np.asarray(problem.sigma)
         start = scattered(problem, 0.3, 1, int(rng.integers(2**31)))
-        found = method.run(problem, start, (shown + noise)[None])
-        if not np.isfinite(found.cost[0]):
+        runs = dataclasses.replace(problem.runs, outputs=shown + noise)
+        own = dataclasses.replace(problem, runs=runs)
+        found = method.run(own, start).one(0)
+        if not np.isfinite(found.cost):
             lost += 1
             continue
-        vehicle, states = problem.split(found.y[0])
-        runs = dataclasses.replace(problem.runs, outputs=shown + noise)
-        result = jax.tree.map(lambda leaf: leaf[0], found.result)
-        cost, steps = found.cost[0], found.evaluations[0]
-        fit = evaluate(vehicle, runs, states, problem.sigma, cost=cost, steps=steps, result=result, known_start=True)
+        fit = setup.fitted(own, found)
         begin = time.perf_counter()
         error = np.abs(np.array(list(fit.values.values())) - truth)
         wide = np.array(list(coloured_covariance(fit).standard_errors.values()))
@@ -97,11 +94,6 @@ def _rate(inside: np.ndarray) -> dict:
     error = float(shares.std(ddof=1) / np.sqrt(len(shares)))
     mean = float(shares.mean())
     return {"observed": mean, "interval": [mean - 1.96 * error, min(1.0, mean + 1.96 * error)]}
-
-
-@eqx.filter_jit
-def _errors(problem: Problem, found: Found) -> Float[Array, "n p"]:
-    return found.y - problem.coordinates()
 
 
 @eqx.filter_jit
@@ -133,17 +125,6 @@ def gauss_markov(rng: np.random.Generator, problem: Problem, size: np.ndarray) -
 @eqx.filter_jit
 def _pushed(problem: Problem, force: Float[Array, "r k n"]) -> Float[Array, "r k c"]:
     """What the sensors show, noise apart, when `force` acts besides."""
-    vehicle: AbstractVehicle = problem.vehicle
-    runs, sampled = problem.runs, Sampled.of(problem.vehicle, problem.runs)
-    nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
+    vehicle, runs = problem.vehicle, problem.runs
     push = jnp.stack([force[:, :-1], force[:, 1:]], axis=2)
-
-    def one(state: Array, node: Array, index: Array, push: Array) -> Array:
-        def advance(state: Array, part: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            after = sampled.step(state, *part)
-            return after, after
-
-        return jnp.concatenate([state[None], jax.lax.scan(advance, state, (node, index, push))[1]])
-
-    states = jax.vmap(one)(problem.guess, nodes, runs.step_of, push)
-    return vehicle.measure(runs.times, states, runs.signals)
+    return measure(vehicle, runs, Sampled.of(vehicle, runs).states(runs, problem.guess, push))

@@ -21,6 +21,7 @@ from jaxsub.filter import (
     samples,
     vehicle_filter,
 )
+from jaxsub.vehicle.catalogue import nps_auv_ii
 
 from . import setup
 from .figures import latencies
@@ -31,7 +32,7 @@ SPREADS = (1.0, 10.0, 100.0)
 
 def run(out: Path, quick: bool) -> dict:
     """Latency on the vehicle with all 21 coefficients of its catalogue free, and agreement of float32 with float64."""
-    spent = steps(setup.problem(setup.catalogue(), setup.recordings(2, 1)), 1 if quick else 5)
+    spent = steps(setup.problem(nps_auv_ii(), setup.recordings(2, 1)), 1 if quick else 5)
     latencies(1e3 * spent, out / "mekf_latency.png")
     milliseconds = {f"p{q:g}": float(1e3 * np.percentile(spent, q)) for q in (50, 90, 99)}
     return {

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.estimate import METHODS, AbstractMethod, Problem, channel_rms, evaluate, output_errors, scattered
+from jaxsub.estimate import METHODS, AbstractMethod, Problem, channel_rms, output_errors, scattered
 from jaxsub.recording import Recording
 from jaxsub.results import RESULTS
 from jaxsub.simulate import at_rest
@@ -36,21 +36,10 @@ def judged(method: AbstractMethod, problem: Problem, start: jax.Array, held_out:
     spent = []
     for _ in range(2):
         begin = time.perf_counter()
-        found = jax.block_until_ready(method.run(problem, start))
+        found = jax.block_until_ready(method.run(problem, start)).one(0)
         spent.append(time.perf_counter() - begin)
-    vehicle, states = problem.split(found.y[0])
-    errors = setup.relative_errors(vehicle, setup.truth())
-    result = jax.tree.map(lambda leaf: leaf[0], found.result)
-    fitted = evaluate(
-        vehicle,
-        problem.runs,
-        states,
-        problem.sigma,
-        cost=found.cost[0],
-        steps=found.evaluations[0],
-        result=result,
-        known_start=True,
-    )
+    fitted, result = setup.fitted(problem, found), found.result
+    errors = setup.relative_errors(fitted.vehicle, setup.truth())
     sizes = np.abs([errors[name] for name in errors])
     return {
         "relative_error": errors,
@@ -62,11 +51,11 @@ def judged(method: AbstractMethod, problem: Problem, start: jax.Array, held_out:
         "converged": bool(fitted.result == RESULTS.successful),
         "said": "successful" if bool(result == RESULTS.successful) else RESULTS[result].split(".")[0],
         "standard_errors_from_optimum": float(fitted.gradient_norm),
-        "cost": float(found.cost[0]),
-        "held_out": free_run(problem, vehicle, held_out),
+        "cost": float(found.cost),
+        "held_out": free_run(problem, fitted.vehicle, held_out),
         "seconds": spent[1],
         "seconds_with_compilation": spent[0],
-        "evaluations": int(found.evaluations[0]),
+        "evaluations": int(found.evaluations),
     }
 
 

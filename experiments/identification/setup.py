@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxsub.control import scenario_one, scenario_two
 from jaxsub.discrepancy import batch
-from jaxsub.estimate import Problem
+from jaxsub.estimate import Fit, Found, Problem, evaluate
 from jaxsub.recording import Recording
 from jaxsub.simulate import at_rest
 from jaxsub.vehicle import AbstractVehicle
@@ -29,11 +29,6 @@ def truth() -> AbstractVehicle:
     """NPS AUV II with all damping and control coefficients free that the scenarios identify."""
     vehicle = nps_auv_ii()
     return with_free(vehicle, [row.name for row in vehicle.layout.free if row.name not in HELD])
-
-
-def catalogue() -> AbstractVehicle:
-    """NPS AUV II with what its catalogue leaves free: all damping and control coefficients."""
-    return nps_auv_ii()
 
 
 def everything(vehicle: AbstractVehicle) -> AbstractVehicle:
@@ -58,6 +53,13 @@ def problem(vehicle: AbstractVehicle, recorded: Sequence[Recording]) -> Problem:
     """Fitting `vehicle` to `recorded`, which begin at rest at the operating speed, as the paper's do."""
     runs = batch(vehicle, recorded)
     return Problem.of(vehicle, runs, sigma(vehicle), at_rest(vehicle, len(recorded)), known_start=True)
+
+
+def fitted(problem: Problem, found: Found) -> Fit:
+    """The fit where one search ended."""
+    vehicle, states = problem.split(found.y)
+    told = {"cost": found.cost, "steps": found.evaluations, "result": found.result}
+    return evaluate(vehicle, problem.runs, states, problem.sigma, **told, known_start=True)
 
 
 def relative_errors(vehicle: AbstractVehicle, true: AbstractVehicle) -> dict[str, float]:

@@ -11,6 +11,8 @@ from .problem import Problem
 
 # larger than any cost and still a number to an algorithm that compares
 _HOPELESS = 1e300
+# members of the population for each coordinate, and what its draws come from
+_MEMBERS, _SEED = 4, 0
 
 
 class Chain(AbstractMethod):
@@ -39,8 +41,7 @@ class Global(AbstractMethod):
 
     - `local`: what completes the search.
     - `span`: half the side of the box, in each parameter's own size; bounds, where a parameter has them, hold besides.
-    - `generations`, `members`: of the evolution, `members` for each coordinate.
-    - `seed`: of its draws.
+    - `generations`: of the evolution.
 
     Source: Storn and Price (1997), J. Global Optimization 11.
     """
@@ -48,8 +49,6 @@ class Global(AbstractMethod):
     local: AbstractMethod
     span: float = 1.5
     generations: int = 300
-    members: int = 4
-    seed: int = 0
 
     def run(
         self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
@@ -77,7 +76,7 @@ class Global(AbstractMethod):
             cost,
             box,
             maxiter=self.generations,
-            popsize=self.members,
+            popsize=_MEMBERS,
             init="sobol",
             x0=np.clip(start, box[:, 0], box[:, 1]),
             mutation=(0.4, 0.9),
@@ -85,7 +84,7 @@ class Global(AbstractMethod):
             polish=False,
             vectorized=True,
             updating="deferred",
-            rng=np.random.default_rng(self.seed),
+            rng=np.random.default_rng(_SEED),
         )
         return evolved.x, sampled
 

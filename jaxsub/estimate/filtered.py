@@ -1,7 +1,5 @@
 """Estimation by filters: parameters and state together, sample after sample."""
 
-import dataclasses
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -15,7 +13,7 @@ from ..filter.passes import identify
 from ..filter.vehicle import VehicleProcess, samples
 from ..results import RESULTS
 from .damped import Damped
-from .method import AbstractMethod, Found, costs, lanes_for, objective, over_cores, problems
+from .method import AbstractMethod, Found, costs, holding, lanes_for, objective, over_cores, problems
 from .pool import pool
 from .problem import Problem
 
@@ -44,9 +42,8 @@ class Filtered(AbstractMethod):
     ) -> Found:
         """Filter from each of the `starts`. A filter that diverges ends as `nonfinite`. Not to be called in `jit`.
 
-        **Raises** `InputError` as `VehicleProcess.of` does.
+        **Raises** `InputError` as `VehicleProcess` does.
         """
-        VehicleProcess.of(problem.vehicle)
         return over_cores(lambda y, z: _filtered(self, problem, y, z), problem, starts, outputs)
 
 
@@ -66,8 +63,7 @@ def _filtered(method: Filtered, problem: Problem, starts: Array, outputs: Array 
     y, diverged = jax.lax.map(one, (jnp.arange(len(starts)), starts), batch_size=lanes)
     if not problem.known_start:
         # a filter needs no initial state; the likelihood does, and the one that suits its parameters is meant
-        still = jnp.zeros(p, bool)
-        settled = lambda index: dataclasses.replace(of(index), origin=y[index, :p], moving=still)
+        settled = holding(of, y, jnp.zeros((len(y), p), bool))
         y = pool(Damped(Problem.expand, _SETTLED), objective, y, settled, lanes=lanes, max_steps=_STEPS).y
     good, lost = RESULTS.promote(optx.RESULTS.successful), RESULTS.promote(optx.RESULTS.nonfinite)
     result = jax.vmap(lambda gone: RESULTS.where(gone, lost, good))(diverged)

@@ -3,7 +3,6 @@
 import dataclasses
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -108,11 +107,9 @@ def search(
     problem = Problem.of(vehicle, runs, noise, start, moving=moving, known_start=known_start)
     y, total = problem.coordinates(), jnp.asarray(0)
     for _ in range(_CONCENTRATIONS):
-        found = (method or gauss_newton()).run(problem, y[None])
-        y, cost, steps, result = jax.tree.map(
-            lambda leaf: leaf[0], (found.y, found.cost, found.evaluations, found.result)
-        )
-        total = total + steps
+        found = (method or gauss_newton()).run(problem, y[None]).one(0)
+        y, cost, result = found.y, found.cost, found.result
+        total = total + found.evaluations
         fitted, states = problem.split(y)
         if not bool(estimated.any()) or not bool(jnp.isfinite(cost)):
             break

@@ -1,6 +1,7 @@
 """What every estimator is to the rest of the house, and those that step from point to point."""
 
 import abc
+import dataclasses
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -11,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from ..results import RESULTS
 from .pool import pool
@@ -31,10 +32,14 @@ class Found(eqx.Module):
     - `result`: a `RESULTS` value each.
     """
 
-    y: Float[Array, "n d"]
-    cost: Float[Array, " n"]
-    evaluations: Int[Array, " n"]
+    y: Float[Array, "*n d"]
+    cost: Float[Array, "*n"]
+    evaluations: Int[Array, "*n"]
     result: RESULTS
+
+    def one(self, index: int) -> "Found":
+        """Where the search numbered `index` ended."""
+        return jax.tree.map(lambda leaf: leaf[index], self)
 
 
 class AbstractMethod(eqx.Module):
@@ -96,6 +101,14 @@ def problems(problem: Problem, outputs: Array | None) -> Callable[[Int[Array, ""
     if outputs is None:
         return lambda index: problem
     return lambda index: eqx.tree_at(lambda problem: problem.runs.outputs, problem, outputs[index])
+
+
+def holding(
+    of: Callable[[Int[Array, ""]], Problem], y: Float[Array, "n d"], moving: Bool[Array, "n p"]
+) -> Callable[[Int[Array, ""]], Problem]:
+    """The problem that each start is for, with the parameters that are not `moving` held at those of `y`."""
+    p = moving.shape[1]
+    return lambda index: dataclasses.replace(of(index), origin=y[index, :p], moving=moving[index])
 
 
 def costs(of: Callable[[Any], Problem], y: Float[Array, "n d"], lanes: int) -> Float[Array, " n"]:

@@ -12,6 +12,9 @@ from scipy.cluster import hierarchy
 from .method import Found
 from .problem import Problem
 
+# standard errors between ends of one basin
+_REACH = 1.0
+
 
 def scattered(problem: Problem, spread: float, count: int, seed: int) -> Float[Array, "n d"]:
     """Coordinates of `count` starts, each parameter drawn uniformly within ± `spread` of the size it has in `problem`.
@@ -65,10 +68,10 @@ class Basin:
     y: np.ndarray
 
 
-def basins(problem: Problem, found: Found, reach: float = 1.0) -> tuple[list[Basin], int]:
+def basins(problem: Problem, found: Found) -> tuple[list[Basin], int]:
     """The ends clustered, the lowest first, and how many searches have no finite end.
 
-    Ends belong together where one can go from each to the next in steps shorter than `reach` standard errors, as the
+    Ends belong together where one can go from each to the next in steps shorter than a standard error, as the
     curvature at the best end has them.
     """
     cost, y = np.asarray(found.cost), np.asarray(found.y)
@@ -82,6 +85,6 @@ def basins(problem: Problem, found: Found, reach: float = 1.0) -> tuple[list[Bas
     whitened = (y[order] - y[order[0]]) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     label = np.ones(1, int)
     if len(order) > 1:
-        label = hierarchy.fcluster(hierarchy.linkage(whitened, "single"), reach, "distance")
+        label = hierarchy.fcluster(hierarchy.linkage(whitened, "single"), _REACH, "distance")
     found_in = {basin: np.flatnonzero(label == basin) for basin in dict.fromkeys(label.tolist())}
     return [Basin(float(cost[order[i[0]]]), len(i), y[order[i[0]]]) for i in found_in.values()], lost

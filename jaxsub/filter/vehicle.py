@@ -10,14 +10,9 @@ from ..effects import AbstractActuator
 from ..errors import InputError
 from ..parameters import Transform
 from ..recording.runs import Runs
-from ..simulate import step_table
-from ..simulate.exponential import exponential_step
-from ..simulate.sampled import parabola
+from ..simulate import Sampled, step_table
 from ..vehicle import AbstractVehicle
-from ..vehicle.base import stack
 from .model import AbstractProcess, Sample
-
-_ANGLES = ("phi", "theta", "psi")
 
 
 class Drive(eqx.Module):
@@ -82,20 +77,9 @@ class VehicleProcess(AbstractProcess):
         inverse = jnp.linalg.inv(vehicle.mass_matrix())
         linear = inverse @ vehicle.damping_matrix()
         frozen = jax.lax.stop_gradient(linear)
-        weights = step_table(frozen, sample.elapsed[None] / self.substeps).at(jnp.asarray(0))
-        n = linear.shape[0]
-
-        @jax.jit
-        def rates(velocity: Array, position: Array, node: Array) -> tuple[Array, Array]:
-            motion = vehicle.motion(jnp.concatenate([velocity, position]), node)
-            moved = stack(vehicle.position_rates(motion), vehicle.layout.positions, velocity[0])
-            return inverse @ vehicle.force(motion) + (linear - frozen) @ velocity, moved
-
-        def advance(carry: tuple[Array, Array], nodes: Array) -> tuple[tuple[Array, Array], None]:
-            return exponential_step(rates, weights, *carry, nodes), None
-
-        carry, _ = jax.lax.scan(advance, (x[:n], x[n:]), _pieces(sample.inputs.nodes, self.substeps))
-        return jnp.concatenate(carry)
+        table = step_table(frozen, sample.elapsed[None] / self.substeps)
+        sampled = Sampled(vehicle, inverse, table, self.substeps, linear - frozen)
+        return sampled.step(x, sample.inputs.nodes, jnp.asarray(0))
 
     def observe(self, x: Float[Array, " s"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " c"]:
         """The vehicle's outputs."""
@@ -103,16 +87,7 @@ class VehicleProcess(AbstractProcess):
 
     def innovation(self, measured: Float[Array, " c"], expected: Float[Array, " c"]) -> Float[Array, " c"]:
         """The difference; angles of a body wrapped to (-π, π]."""
-        difference = measured - expected
-        layout = self.vehicle.layout
-        turns = jnp.array([c in _ANGLES and layout.kind == "submerged-body" for c in layout.channels])
-        return jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
-
-
-def _pieces(nodes: Float[Array, "3 m"], parts: int) -> Float[Array, "q 3 m"]:
-    """Nodes of `parts` equal pieces of the interval, on the parabola through the three given."""
-    middles = parabola(jnp.arange(2 * parts + 1, dtype=nodes.dtype) / (2.0 * parts)) @ nodes
-    return jnp.stack([middles[:-2:2], middles[1:-1:2], middles[2::2]], axis=1)
+        return self.vehicle.deviation(measured, expected)
 
 
 def samples(runs: Runs) -> Sample:

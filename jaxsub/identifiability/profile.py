@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..errors import InputError, nearest
 from ..estimate import Fit, Problem, gauss_newton
-from ..estimate.method import costs, lanes_for, objective
+from ..estimate.method import costs, holding, lanes_for, objective
 from ..estimate.pool import pool
 from ..results import RESULTS
 
@@ -77,18 +77,14 @@ def _coordinates(fit: Fit, problem: Problem, theta: np.ndarray) -> Float[Array, 
     # initial states that are known have no spread, and no coordinates
     moved = (fit.start - problem.guess) / jnp.where(problem.spread > 0.0, problem.spread, 1.0)
     states = problem.coordinates()[theta.shape[1] :]
-    rows = jnp.stack([problem.at(jnp.asarray(row)) for row in theta])
+    rows = jax.vmap(problem.at)(jnp.asarray(theta))
     return rows.at[:, theta.shape[1] :].set(moved.ravel()[: states.size])
 
 
 @eqx.filter_jit
 def _costs(problem: Problem, starts: Float[Array, "g d"], moving: Bool[Array, "g p"]) -> Float[Array, " g"]:
     """The least cost from each start with only the coefficients `moving` free; NaN where the search failed."""
-    p = moving.shape[1]
-
-    def held(index: Array) -> Problem:
-        return eqx.tree_at(lambda q: (q.origin, q.moving), problem, (starts[index, :p], moving[index]))
-
+    p, held = moving.shape[1], holding(lambda _: problem, starts, moving)
     method, lanes = gauss_newton(), lanes_for(problem)
     ends = pool(method.solver, objective, starts, held, lanes=lanes, max_steps=method.max_steps)
     # the prior of a coefficient that is held counts at its held value

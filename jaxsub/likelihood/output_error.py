@@ -11,8 +11,6 @@ from ..recording.runs import Runs
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 
-ANGLES = ("phi", "theta", "psi")
-
 
 def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
     """Measured minus modelled outputs in SI from the initial states `start`, zero where nothing was measured."""
@@ -21,10 +19,7 @@ def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> 
 
 def residual_outputs(vehicle: AbstractVehicle, runs: Runs, modelled: Float[Array, "r k c"]) -> Float[Array, "r k c"]:
     """Measured minus `modelled`; angles wrapped to (-π, π], zero where nothing was measured."""
-    difference = runs.outputs - modelled
-    turns = jnp.array([c in ANGLES and vehicle.layout.kind == "submerged-body" for c in vehicle.layout.channels])
-    wrapped = jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
-    return jnp.where(runs.mask, wrapped, 0.0)
+    return jnp.where(runs.mask, vehicle.deviation(runs.outputs, modelled), 0.0)
 
 
 def concentrated_sigma(error: Float[Array, "r k c"], runs: Runs) -> Float[Array, " c"]:

@@ -20,12 +20,14 @@ class Sampled(eqx.Module):
     - `inverse`: (n, n) inverse of the inertia matrix.
     - `table`: weights of the distinct steps of some runs.
     - `substeps`: steps in each sample interval.
+    - `rest`: (n, n) what the linear part has beyond that of `table`, 1/s; it acts as a force does.
     """
 
     vehicle: AbstractVehicle
     inverse: Float[Array, "n n"]
     table: StepTable
     substeps: int = eqx.field(static=True)
+    rest: Float[Array, "n n"] | None = None
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, runs: Runs) -> "Sampled":
@@ -57,7 +59,8 @@ class Sampled(eqx.Module):
             signals, force = (node, 0.0) if extra is None else (node[:-n], node[-n:])
             motion = self.vehicle.motion(jnp.concatenate([velocity, position]), signals)
             moved = stack(self.vehicle.position_rates(motion), self.vehicle.layout.positions, velocity[0])
-            return self.inverse @ (self.vehicle.force(motion) + force), moved
+            rate = self.inverse @ (self.vehicle.force(motion) + force)
+            return rate if self.rest is None else rate + self.rest @ velocity, moved
 
         def advance(carry: tuple[Array, Array], part: Array) -> tuple[tuple[Array, Array], None]:
             return exponential_step(rates, weights, *carry, part), None
@@ -69,19 +72,21 @@ class Sampled(eqx.Module):
             carry, _ = jax.lax.scan(advance, carry, _subdivide(full, self.substeps))
         return jnp.concatenate(carry)
 
-    def states(self, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
-        """States at the samples of `runs` from the initial states `start`."""
+    def states(
+        self, runs: Runs, start: Float[Array, "r s"], push: Float[Array, "r k1 2 n"] | None = None
+    ) -> Float[Array, "r k s"]:
+        """States at the samples of `runs` from the initial states `start`, under `push` in each interval if given."""
         nodes = jax.vmap(self.vehicle.actuate)(runs.times, runs.nodes())
 
-        def advance(state: Array, interval: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            node, index, live = interval
-            after = jnp.where(live, self.step(state, node, index), state)
+        def advance(state: Array, interval: tuple[Array, Array, Array, Array | None]) -> tuple[Array, Array]:
+            node, index, live, push = interval
+            after = jnp.where(live, self.step(state, node, index, push), state)
             return after, after
 
-        def run(state: Array, node: Array, index: Array, live: Array) -> Array:
-            return jnp.concatenate([state[None], jax.lax.scan(advance, state, (node, index, live))[1]])
+        def run(state: Array, node: Array, index: Array, live: Array, push: Array | None) -> Array:
+            return jnp.concatenate([state[None], jax.lax.scan(advance, state, (node, index, live, push))[1]])
 
-        return jax.vmap(run)(start, nodes, runs.step_of, runs.live)
+        return jax.vmap(run)(start, nodes, runs.step_of, runs.live, push)
 
 
 def parabola(s: Float[Array, " *k"]) -> Float[Array, "*k 3"]:

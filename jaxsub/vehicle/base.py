@@ -21,6 +21,8 @@ from ..effects import (
 )
 from ..parameters import Parameter
 
+_ANGLES = ("phi", "theta", "psi")
+
 
 @dataclasses.dataclass(frozen=True)
 class Output:
@@ -190,6 +192,12 @@ class AbstractVehicle(eqx.Module):
             if isinstance(effect, AbstractSensor):
                 shown[effect.channel] = effect.measure(times, shown[effect.channel])
         return stack(shown, self.layout.channels, times)
+
+    def deviation(self, measured: Float[Array, "*k c"], modelled: Float[Array, "*k c"]) -> Float[Array, "*k c"]:
+        """`measured` minus `modelled` channels; angles of a body wrapped to (-π, π]."""
+        difference = measured - modelled
+        turns = jnp.array([c in _ANGLES and self.layout.kind == "submerged-body" for c in self.layout.channels])
+        return jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
 
 
 def stack(named: Mapping[str, Signal], order: tuple[str, ...], like: Signal) -> Float[Array, "*k n"]:
