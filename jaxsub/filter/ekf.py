@@ -12,9 +12,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import block_diag
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from .form import AbstractForm, SquareRoot
+from .gate import AbstractGate, Open
 from .model import AbstractProcess, Sample, linearised
 from .noise import AbstractNoiseRule, Residuals
 
@@ -24,18 +25,19 @@ class FilterState(eqx.Module):
 
     **Fields**
 
-    - `x`: (s,) state. `theta`: (p,) parameters.
+    - `x`: (n,) state, of s ways to change. `theta`: (p,) parameters.
     - `joint`: what the filter's form keeps of the uncertainty of [x, θ]; `own`: of x were θ known, where it has that.
-    - `memory`, `residuals`: of the process-noise rule.
+    - `memory`, `residuals`: of the process-noise rule. `refused`: (c,) how often the gate refused a channel in a row.
     - `diverged`: whether a number ceased to be finite. The filter then stays at its last finite numbers.
     """
 
-    x: Float[Array, " s"]
+    x: Float[Array, " n"]
     theta: Float[Array, " p"]
     joint: Float[Array, "q q"]
     own: Float[Array, "s s"] | None
     memory: Any
     residuals: Residuals
+    refused: Int[Array, " c"]
     diverged: Bool[Array, ""]
 
 
@@ -44,18 +46,22 @@ class Estimate(eqx.Module):
 
     **Fields**
 
-    - `x`, `theta`: estimates; `x_std`, `theta_std`: their standard deviations.
-    - `innovation`: (c,) measured minus predicted, zero where missing; `factor`: (c, c) lower-triangular factor of its
-      covariance, parameters' uncertainty included: the whitened innovation is factor⁻¹ innovation.
+    - `x`, `theta`: estimates; `x_std`, `theta_std`: their standard deviations, the state's s of its changes.
+    - `innovation`: (c,) measured minus predicted, zero where missing or refused; `factor`: (c, c) lower-triangular
+      factor of its covariance, parameters' uncertainty included: the whitened innovation is factor⁻¹ innovation.
+    - `used`: (c,) true where measured and believed. `noise_std`: (s,) root of the process noise's variance in the
+      interval before.
     - `diverged`: as in `FilterState`.
     """
 
-    x: Float[Array, "*k s"]
+    x: Float[Array, "*k n"]
     theta: Float[Array, "*k p"]
     x_std: Float[Array, "*k s"]
     theta_std: Float[Array, "*k p"]
     innovation: Float[Array, "*k c"]
     factor: Float[Array, "*k c c"]
+    used: Bool[Array, "*k c"]
+    noise_std: Float[Array, "*k s"]
     diverged: Bool[Array, " *k"]
 
 
@@ -67,7 +73,7 @@ class AbstractFilter(eqx.Module):
     - `process`: what it follows. `noise`: how far the state may stray from it.
     - `R_root`: (c, c) lower Cholesky factor of the measurement noise's covariance.
     - `x_root`: (s, s) square root of the covariance of a run's initial state.
-    - `form`: how uncertainty is kept.
+    - `form`: how uncertainty is kept. `gate`: which measurements are believed.
     """
 
     process: eqx.AbstractVar[AbstractProcess]
@@ -75,6 +81,7 @@ class AbstractFilter(eqx.Module):
     R_root: eqx.AbstractVar[Float[Array, "c c"]]
     x_root: eqx.AbstractVar[Float[Array, "s s"]]
     form: eqx.AbstractVar[AbstractForm]
+    gate: eqx.AbstractVar[AbstractGate]
 
     @abc.abstractmethod
     def own(self) -> Float[Array, "s s"] | None:
@@ -85,33 +92,72 @@ class AbstractFilter(eqx.Module):
         """Across the interval before `sample`, with process noise of covariance G Gᵀ."""
 
     @abc.abstractmethod
-    def correct(self, state: FilterState, sample: Sample) -> tuple[FilterState, Float[Array, "c c"]]:
+    def correct(self, state: FilterState, seen: "Innovation") -> tuple[FilterState, Float[Array, "c c"]]:
         """By what was measured, and the factor of the innovation's covariance."""
 
-    def start(self, x: Float[Array, " s"], theta: Float[Array, " p"], theta_root: Float[Array, "p p"]) -> FilterState:
+    def start(self, x: Float[Array, " n"], theta: Float[Array, " p"], theta_root: Float[Array, "p p"]) -> FilterState:
         """Before the first sample; `theta_root` is a square root of the parameters' covariance."""
         joint = self.form.start(block_diag(self.x_root, theta_root))
-        residuals = Residuals.none(x, self.R_root)
-        diverged = jnp.zeros((), bool)
-        return _strong(FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, diverged))
+        return self._begun(x, theta, joint, jnp.zeros((), bool))
 
-    def restart(self, state: FilterState, x: Float[Array, " s"]) -> FilterState:
+    def restart(self, state: FilterState, x: Float[Array, " n"]) -> FilterState:
         """Before the first sample of another run: the state starts anew, the parameters and their covariance stay."""
-        joint, residuals = self.form.restart(self.x_root, state.joint), Residuals.none(x, self.R_root)
-        return _strong(FilterState(x, state.theta, joint, self.own(), self.noise.start(), residuals, state.diverged))
+        return self._begun(x, state.theta, self.form.restart(self.x_root, state.joint), state.diverged)
+
+    def _begun(
+        self, x: Float[Array, " n"], theta: Float[Array, " p"], joint: Float[Array, "q q"], diverged: Bool[Array, ""]
+    ) -> FilterState:
+        residuals = Residuals.none(self.x_root, self.R_root)
+        refused = jnp.zeros(len(self.R_root), int)
+        return _strong(FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, refused, diverged))
 
     def step(self, state: FilterState, sample: Sample) -> tuple[FilterState, Estimate]:
         """The next state and what is known after `sample`."""
-        memory, G = self.noise(state.memory, state.residuals, sample.elapsed)
+        memory, root = self.noise(state.memory, state.residuals, sample.elapsed)
+        G = self.process.driven(state.x, state.theta, sample, root)
+        moves = sample.elapsed > 0.0
         moved = dataclasses.replace(self.predict(state, sample, G), memory=memory)
-        after, factor = self.correct(_select(sample.elapsed > 0.0, moved, state), sample)
+        before = _select(moves, moved, state)
+        seen = self._look(before, sample)
+        refused = jnp.where(seen.mask, 0, before.refused + (sample.mask & ~seen.mask))
+        after, factor = self.correct(dataclasses.replace(before, refused=refused), seen)
         finite = jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(after)])
         sound = jnp.all(finite) & ~state.diverged
         after = dataclasses.replace(_select(sound, after, state), diverged=~sound)
-        s = after.x.size
+        s = len(self.x_root)
         deviations = self.form.deviations(after.joint)
-        innovation, factor = after.residuals.innovation, jnp.where(sound, factor, self.R_root)
-        return after, Estimate(after.x, after.theta, deviations[:s], deviations[s:], innovation, factor, after.diverged)
+        residuals, factor = after.residuals, jnp.where(sound, factor, self.R_root)
+        noise_std = jnp.where(moves & sound, jnp.linalg.norm(G, axis=1), 0.0)
+        parts = (after.x, after.theta, deviations[:s], deviations[s:], residuals.innovation, factor, residuals.mask)
+        return after, Estimate(*parts, noise_std, after.diverged)
+
+    def _look(self, state: FilterState, sample: Sample) -> "Innovation":
+        """What `sample` shows, what the gate refuses left out."""
+        process = self.process
+        ways = jnp.zeros(len(self.x_root), state.x.dtype)
+        observe = lambda change, theta: process.observe(process.moved(state.x, change), theta, sample)
+        expected, by_change, by_theta = linearised(observe, ways, state.theta)
+        C = jnp.concatenate([by_change, by_theta], axis=1)
+        R_root = self.R_root if sample.scale is None else sample.scale[:, None] * self.R_root
+        innovation = process.innovation(sample.outputs, expected)
+        believed = self.gate(state.refused, innovation, self.form.innovation_deviations(state.joint, C, R_root))
+        mask = sample.mask & believed
+        return Innovation(jnp.where(mask, innovation, 0.0), mask, C, R_root)
+
+
+class Innovation(eqx.Module):
+    """What a sample shows that was not expected.
+
+    **Fields**
+
+    - `value`: (c,) zero where missing or refused; `mask`: (c,) true elsewhere.
+    - `C`: (c, q) Jacobian of the outputs by [x, θ]. `R_root`: (c, c) factor of the sensors' covariance.
+    """
+
+    value: Float[Array, " c"]
+    mask: Bool[Array, " c"]
+    C: Float[Array, "c q"]
+    R_root: Float[Array, "c c"]
 
 
 def on_line(filter: AbstractFilter) -> Callable[[FilterState, Sample], tuple[FilterState, Estimate]]:
@@ -130,6 +176,7 @@ class ExtendedKalmanFilter(AbstractFilter):
     R_root: Float[Array, "c c"]
     x_root: Float[Array, "s s"]
     form: AbstractForm = SquareRoot()
+    gate: AbstractGate = Open()
 
     def own(self) -> None:
         """There is one filter only."""
@@ -140,36 +187,30 @@ class ExtendedKalmanFilter(AbstractFilter):
         x, joint, _ = augmented_predict(self, state, sample, G)
         return dataclasses.replace(state, x=x, joint=joint)
 
-    def correct(self, state: FilterState, sample: Sample) -> tuple[FilterState, Float[Array, "c c"]]:
+    def correct(self, state: FilterState, seen: Innovation) -> tuple[FilterState, Float[Array, "c c"]]:
         """The augmented update."""
-        s = state.x.size
-        innovation, C = observed(self, state, sample)
-        gain, factor, joint = self.form.update(state.joint, C, self.R_root, sample.mask)
-        change = gain @ innovation
-        residuals = Residuals(innovation, sample.mask, factor, gain[:s], change[:s])
-        x, theta = state.x + change[:s], state.theta + change[s:]
+        s = len(self.x_root)
+        gain, factor, joint = self.form.update(state.joint, seen.C, seen.R_root, seen.mask)
+        change = gain @ seen.value
+        residuals = Residuals(seen.value, seen.mask, factor, gain[:s], change[:s])
+        x, theta = self.process.moved(state.x, change[:s]), state.theta + change[s:]
         return dataclasses.replace(state, x=x, theta=theta, joint=joint, residuals=residuals), factor
 
 
 def augmented_predict(
     filter: AbstractFilter, state: FilterState, sample: Sample, G: Float[Array, "s m"]
-) -> tuple[Float[Array, " s"], Float[Array, "q q"], Float[Array, "s s"]]:
+) -> tuple[Float[Array, " n"], Float[Array, "q q"], Float[Array, "s s"]]:
     """The next state, what is kept of the uncertainty of [x, θ], and the Jacobian of the step by the state."""
-    p = state.theta.size
-    x, F, by_theta = linearised(lambda x, theta: filter.process.step(x, theta, sample), state.x, state.theta)
+    process, p = filter.process, state.theta.size
+    x = process.step(state.x, state.theta, sample)
+
+    def change_after(change: Array, theta: Array) -> Array:
+        return process.apart(process.step(process.moved(state.x, change), theta, sample), x)
+
+    _, F, by_theta = linearised(change_after, jnp.zeros(len(filter.x_root), x.dtype), state.theta)
     whole = jnp.block([[F, by_theta], [jnp.zeros_like(by_theta.T), jnp.eye(p, dtype=F.dtype)]])
     noise = jnp.concatenate([G, jnp.zeros((p, G.shape[1]), G.dtype)])
     return x, filter.form.predict(state.joint, whole, noise), F
-
-
-def observed(
-    filter: AbstractFilter, state: FilterState, sample: Sample
-) -> tuple[Float[Array, " c"], Float[Array, "c q"]]:
-    """The innovation, zero where missing, and the Jacobian of the outputs by [x, θ]."""
-    process = filter.process
-    expected, C, by_theta = linearised(lambda x, theta: process.observe(x, theta, sample), state.x, state.theta)
-    innovation = jnp.where(sample.mask, process.innovation(sample.outputs, expected), 0.0)
-    return innovation, jnp.concatenate([C, by_theta], axis=1)
 
 
 def _strong(state: FilterState) -> FilterState:

@@ -9,8 +9,9 @@ import dataclasses
 
 from jaxtyping import Array, Float
 
-from .ekf import AbstractFilter, FilterState, augmented_predict, observed
+from .ekf import AbstractFilter, FilterState, Innovation, augmented_predict
 from .form import AbstractForm, SquareRoot
+from .gate import AbstractGate, Open
 from .model import AbstractProcess, Sample
 from .noise import AbstractNoiseRule, Residuals
 
@@ -23,6 +24,7 @@ class ModifiedKalmanFilter(AbstractFilter):
     R_root: Float[Array, "c c"]
     x_root: Float[Array, "s s"]
     form: AbstractForm = SquareRoot()
+    gate: AbstractGate = Open()
 
     def own(self) -> Float[Array, "s s"]:
         """Filter I starts with the same uncertainty of the state as filter II."""
@@ -34,15 +36,14 @@ class ModifiedKalmanFilter(AbstractFilter):
         assert state.own is not None
         return dataclasses.replace(state, x=x, joint=joint, own=self.form.predict(state.own, F, G))
 
-    def correct(self, state: FilterState, sample: Sample) -> tuple[FilterState, Float[Array, "c c"]]:
+    def correct(self, state: FilterState, seen: Innovation) -> tuple[FilterState, Float[Array, "c c"]]:
         """I corrects the state and II the parameters, from one innovation."""
-        s = state.x.size
-        innovation, C = observed(self, state, sample)
+        s = len(self.x_root)
         assert state.own is not None
-        gain, factor, own = self.form.update(state.own, C[:, :s], self.R_root, sample.mask)
-        joint_gain, joint_factor, joint = self.form.update(state.joint, C, self.R_root, sample.mask)
-        correction = gain @ innovation
-        residuals = Residuals(innovation, sample.mask, factor, gain, correction)
-        x, theta = state.x + correction, state.theta + joint_gain[s:] @ innovation
+        gain, factor, own = self.form.update(state.own, seen.C[:, :s], seen.R_root, seen.mask)
+        joint_gain, joint_factor, joint = self.form.update(state.joint, seen.C, seen.R_root, seen.mask)
+        correction = gain @ seen.value
+        residuals = Residuals(seen.value, seen.mask, factor, gain, correction)
+        x, theta = self.process.moved(state.x, correction), state.theta + joint_gain[s:] @ seen.value
         after = dataclasses.replace(state, x=x, theta=theta, joint=joint, own=own, residuals=residuals)
         return after, joint_factor

@@ -17,27 +17,47 @@ class Sample(eqx.Module):
     - `inputs`: whatever the process takes.
     - `elapsed`: s since the sample before; zero at the first of a run and where padded: there no time passes.
     - `outputs`: (c,) measured channels; `mask`: (c,) true where measured.
+    - `scale`: (c,) noise of the channels in terms of what the filter was told; by default one.
     """
 
     inputs: PyTree[Array]
     elapsed: Float[Array, " *k"]
     outputs: Float[Array, "*k c"]
     mask: Bool[Array, "*k c"]
+    scale: Float[Array, "*k c"] | None = None
 
 
 class AbstractProcess(eqx.Module):
-    r"""$x_k = f(x_{k-1}, \theta, u_k)$ and $z_k = h(x_k, \theta, u_k)$ with s states, p parameters and c channels.
+    r"""$x_k = f(x_{k-1}, \theta, u_k)$ and $z_k = h(x_k, \theta, u_k)$ with p parameters and c channels.
 
-    $\theta$ may be empty. Both maps are differentiated by the filters.
+    $\theta$ may be empty. Both maps are differentiated by the filters. The state is n numbers with s ways to change:
+    where it is a vector, n = s and a change is added to it; an attitude has a rotation for a change.
     """
 
     @abc.abstractmethod
-    def step(self, x: Float[Array, " s"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " s"]:
+    def step(self, x: Float[Array, " n"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " n"]:
         """The state at `sample`, given the state at the sample before."""
 
     @abc.abstractmethod
-    def observe(self, x: Float[Array, " s"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " c"]:
+    def observe(self, x: Float[Array, " n"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " c"]:
         """What the sensors show."""
+
+    def moved(self, x: Float[Array, " n"], change: Float[Array, " s"]) -> Float[Array, " n"]:
+        """The state that lies `change` from `x`."""
+        return x + change
+
+    def apart(self, x: Float[Array, " n"], origin: Float[Array, " n"]) -> Float[Array, " s"]:
+        """The change from `origin` to `x`: moved(origin, apart(x, origin)) is x."""
+        return x - origin
+
+    def driven(
+        self, x: Float[Array, " n"], theta: Float[Array, " p"], sample: Sample, root: Float[Array, "s m"]
+    ) -> Float[Array, "s k"]:
+        """A root of all that drives the state in the step from `x`: the rule's `root`, and what a process adds to it.
+
+        A process that takes measured inputs adds their noise here.
+        """
+        return root
 
     def innovation(self, measured: Float[Array, " c"], expected: Float[Array, " c"]) -> Float[Array, " c"]:
         """How far `measured` lies from `expected`; a process with angles wraps them here."""
@@ -45,12 +65,12 @@ class AbstractProcess(eqx.Module):
 
 
 def linearised(
-    f: Callable[[Array, Array], Array], x: Float[Array, " s"], theta: Float[Array, " p"]
+    f: Callable[[Array, Array], Array], change: Float[Array, " s"], theta: Float[Array, " p"]
 ) -> tuple[Float[Array, " m"], Float[Array, "m s"], Float[Array, "m p"]]:
-    """The value of `f` at (x, θ) and its Jacobians by x and by θ."""
+    """The value of `f` at a change of the state and θ, and its Jacobians by both."""
     # one argument at a time: what depends on the parameters alone, such as a matrix exponential, has no state tangents
-    value, by_x = _columns(lambda x: f(x, theta), x)
-    return value, by_x, _columns(lambda theta: f(x, theta), theta)[1]
+    value, by_change = _columns(lambda change: f(change, theta), change)
+    return value, by_change, _columns(lambda theta: f(change, theta), theta)[1]
 
 
 def _columns(f: Callable[[Array], Array], at: Float[Array, " q"]) -> tuple[Float[Array, " m"], Float[Array, "m q"]]:

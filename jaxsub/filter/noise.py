@@ -17,7 +17,7 @@ class Residuals(eqx.Module):
 
     **Fields**
 
-    - `innovation`: (c,) zero where missing; `mask`: (c,) true where measured.
+    - `innovation`: (c,) zero where missing or refused; `mask`: (c,) true where used.
     - `factor`: (c, c) lower-triangular factor of the innovation's covariance.
     - `gain`: (s, c) of the state; `correction`: (s,) gain times innovation.
     """
@@ -29,11 +29,11 @@ class Residuals(eqx.Module):
     correction: Float[Array, " s"]
 
     @classmethod
-    def none(cls, x: Float[Array, " s"], R_root: Float[Array, "c c"]) -> "Residuals":
-        """Those before the first measurement of a state like `x` by channels of noise `R_root`."""
-        c = len(R_root)
-        nothing = jnp.zeros(c, x.dtype)
-        return cls(nothing, jnp.zeros(c, bool), R_root, jnp.zeros((x.size, c), x.dtype), jnp.zeros_like(x))
+    def none(cls, x_root: Float[Array, "s s"], R_root: Float[Array, "c c"]) -> "Residuals":
+        """Those before the first measurement of a state of uncertainty `x_root` by channels of noise `R_root`."""
+        s, c = len(x_root), len(R_root)
+        kind = x_root.dtype
+        return cls(jnp.zeros(c, kind), jnp.zeros(c, bool), R_root, jnp.zeros((s, c), kind), jnp.zeros(s, kind))
 
 
 class AbstractNoiseRule(eqx.Module):

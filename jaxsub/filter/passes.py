@@ -10,7 +10,7 @@ from .model import Sample
 
 
 def over_runs(
-    filter: AbstractFilter, state: FilterState, samples: Sample, starts: Float[Array, "r s"]
+    filter: AbstractFilter, state: FilterState, samples: Sample, starts: Float[Array, "r n"]
 ) -> tuple[FilterState, Estimate]:
     """The state after R runs of K samples and what was known after each, (R, K) of them.
 
@@ -45,7 +45,7 @@ class Identified(eqx.Module):
 def identify(
     filter: AbstractFilter,
     samples: Sample,
-    starts: Float[Array, "r s"],
+    starts: Float[Array, "r n"],
     theta: Float[Array, " p"],
     theta_root: Float[Array, "p p"] | None = None,
     passes: int = 1,
@@ -60,7 +60,7 @@ def identify(
 
     def once(theta: Array, _: None) -> tuple[Array, tuple[Array, Array, Array]]:
         state, _estimates = over_runs(filter, filter.start(starts[0], theta, root), samples, starts)
-        s = state.x.size
+        s = len(filter.x_root)
         return state.theta, (state.theta, filter.form.covariance(state.joint)[s:, s:], state.diverged)
 
     theta, (trace, covariance, diverged) = jax.lax.scan(once, theta, None, length=passes)
