@@ -24,8 +24,8 @@ from jaxtyping import Array, Bool, Float
 
 from ..errors import InputError
 
-# a difference of less than this many roundings of the data is none: several operations lie behind a table entry
-_ROUNDINGS = 4.0
+# what several operations and the rounding of the times may do to a table entry
+_ROUNDINGS = 1.0
 # samples taken into the table at once: enough for the windows in use, few enough to compile fast
 _UNROLL = 16
 
@@ -65,7 +65,7 @@ def fuzzy_line(
     zero and c₀ is half their range over (1 - h); without any sample all is zero.
 
     The answer is differentiable by times, values and level where the set of samples that the band touches does not
-    change. Elsewhere, among tied samples, the derivative is that of one of the adjoining pieces or the mean of two; a
+    change. Elsewhere, among tied samples, the derivative is that of one of the adjoining pieces or a mean of them; a
     middle of several optima is differentiated as the middle of the same two slopes, as if moving a time kept the tie.
 
     **Raises**: `InputError` for a `level` given as a number outside [0, 1).
@@ -77,7 +77,7 @@ def fuzzy_line(
     times, values = (jnp.where(mask, a, jnp.where(jnp.any(mask), a[first], 0.0)) for a in (times, values))
     origin, reference = jnp.min(times), jax.lax.stop_gradient(values[first])
     t, x = times - origin, values - reference
-    low, high = _steepness(t, x, mask, jnp.max(jnp.abs(times)), jnp.max(jnp.abs(values)))
+    low, high = _steepness(t, x, mask, jnp.max(jnp.abs(times)))
     upper, lower = jnp.max(x - high * t), jnp.min(x - low * t)
     return FuzzyLine(
         origin,
@@ -91,9 +91,8 @@ def _steepness(
     x: Float[Array, " m"],
     mask: Bool[Array, " m"],
     latest: Float[Array, ""],
-    size: Float[Array, ""],
 ) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """The slopes of L and U; `latest` and `size` bound the data as they were given and rounded."""
+    """The slopes of L and U; `latest` bounds the times as they were given, and rounded."""
     rounding = _ROUNDINGS * jnp.finfo(x.dtype).eps
     # exact products with 1, 0 and -1: the derivative of indexing is slow on a CPU
     differences = jnp.asarray(_pairs(len(x)), x.dtype)
@@ -104,7 +103,7 @@ def _steepness(
     mean = jnp.sum(jnp.where(mask, t, 0.0)) / jnp.maximum(jnp.sum(mask), 1)
     s, about, x = jax.lax.stop_gradient((slopes, t - mean, x))
     F, G = _touching(s, about, x)
-    slack = rounding * (size + jnp.abs(s) * latest)
+    slack = rounding * (jnp.max(jnp.abs(x)) + jnp.abs(s) * latest)
     high, low, both = (
         _middle(slopes, jnp.where(distinct, cost, jnp.inf), allowed)
         for cost, allowed in ((F, slack), (-G, slack), (F - G, 2.0 * slack))
@@ -134,8 +133,8 @@ def _touching(
 
 
 def _middle(slopes: Float[Array, " k"], cost: Float[Array, " k"], slack: Float[Array, " k"]) -> Float[Array, ""]:
-    """The middle of the slopes whose cost is the least to within `slack`; without a finite cost that of all."""
-    best = cost <= jnp.min(cost) + slack
+    """The middle of the slopes of least cost, each known to within its `slack`; without a finite cost that of all."""
+    best = cost - slack <= jnp.min(cost + slack)
     least = jnp.min(jnp.where(best, slopes, jnp.inf))
     most = jnp.max(jnp.where(best, slopes, -jnp.inf))
     return 0.5 * (least + most)
