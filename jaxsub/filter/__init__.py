@@ -1,31 +1,47 @@
 """Filters: square-root Kalman algebra, extended Kalman filters on it, and the process noise that they share."""
 
+from .consistent import ConsistentFuzzyNoise
 from .defaults import state_scale, vehicle_filter
 from .ekf import AbstractFilter, Estimate, ExtendedKalmanFilter, FilterState, on_line
 from .form import AbstractForm, Covariance, SquareRoot
+from .fuzzy import FuzzyNoise
+from .gate import AbstractGate, InnovationGate, Open
 from .mekf import ModifiedKalmanFilter
 from .model import AbstractProcess, Sample, linearised
-from .noise import AbstractNoiseRule, ConstantNoise, Residuals
+from .noise import AbstractNoiseRule, ConstantNoise, Innovation, Residuals
 from .passes import Identified, identify, over_runs
+from .regression import FuzzyLine, fuzzy_line
+from .rules import InnovationNoise, RandomNoise, SageHusaNoise
 from .vehicle import Drive, VehicleProcess, samples
 
 __all__ = [
     "AbstractFilter",
     "AbstractForm",
+    "AbstractGate",
     "AbstractNoiseRule",
     "AbstractProcess",
+    "ConsistentFuzzyNoise",
     "ConstantNoise",
     "Covariance",
     "Drive",
     "Estimate",
     "ExtendedKalmanFilter",
     "FilterState",
+    "FuzzyLine",
+    "FuzzyNoise",
     "Identified",
+    "Innovation",
+    "InnovationGate",
+    "InnovationNoise",
     "ModifiedKalmanFilter",
+    "Open",
+    "RandomNoise",
     "Residuals",
+    "SageHusaNoise",
     "Sample",
     "SquareRoot",
     "VehicleProcess",
+    "fuzzy_line",
     "identify",
     "linearised",
     "on_line",

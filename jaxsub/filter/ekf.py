@@ -17,7 +17,7 @@ from jaxtyping import Array, Bool, Float, Int
 from .form import AbstractForm, SquareRoot
 from .gate import AbstractGate, Open
 from .model import AbstractProcess, Sample, linearised
-from .noise import AbstractNoiseRule, Residuals
+from .noise import AbstractNoiseRule, Innovation, Residuals
 
 
 class FilterState(eqx.Module):
@@ -92,7 +92,11 @@ class AbstractFilter(eqx.Module):
         """Across the interval before `sample`, with process noise of covariance G Gᵀ."""
 
     @abc.abstractmethod
-    def correct(self, state: FilterState, seen: "Innovation") -> tuple[FilterState, Float[Array, "c c"]]:
+    def widened(self, state: FilterState, G: Float[Array, "s m"]) -> FilterState:
+        """With process noise of covariance G Gᵀ added where it stands."""
+
+    @abc.abstractmethod
+    def correct(self, state: FilterState, seen: Innovation) -> tuple[FilterState, Float[Array, "c c"]]:
         """By what was measured, and the factor of the innovation's covariance."""
 
     def start(self, x: Float[Array, " n"], theta: Float[Array, " p"], theta_root: Float[Array, "p p"]) -> FilterState:
@@ -114,24 +118,30 @@ class AbstractFilter(eqx.Module):
     def step(self, state: FilterState, sample: Sample) -> tuple[FilterState, Estimate]:
         """The next state and what is known after `sample`."""
         memory, root = self.noise(state.memory, state.residuals, sample.elapsed)
-        G = self.process.driven(state.x, state.theta, sample, root)
         moves = sample.elapsed > 0.0
+        G = jnp.where(moves, self.process.driven(state.x, state.theta, sample, root), 0.0)
         moved = dataclasses.replace(self.predict(state, sample, G), memory=memory)
         before = _select(moves, moved, state)
         seen = self._look(before, sample)
         refused = jnp.where(seen.mask, 0, before.refused + (sample.mask & ~seen.mask))
-        after, factor = self.correct(dataclasses.replace(before, refused=refused), seen)
+        before = dataclasses.replace(before, refused=refused)
+        surprise = self.noise.surprise(before.memory, seen)
+        if surprise is not None:
+            memory, more = surprise
+            before = dataclasses.replace(self.widened(before, more), memory=memory)
+            G = jnp.concatenate([G, more], axis=1)
+        after, factor = self.correct(before, seen)
         finite = jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(after)])
         sound = jnp.all(finite) & ~state.diverged
         after = dataclasses.replace(_select(sound, after, state), diverged=~sound)
         s = len(self.x_root)
         deviations = self.form.deviations(after.joint)
         residuals, factor = after.residuals, jnp.where(sound, factor, self.R_root)
-        noise_std = jnp.where(moves & sound, jnp.linalg.norm(G, axis=1), 0.0)
+        noise_std = jnp.where(sound, jnp.linalg.norm(G, axis=1), 0.0)
         parts = (after.x, after.theta, deviations[:s], deviations[s:], residuals.innovation, factor, residuals.mask)
         return after, Estimate(*parts, noise_std, after.diverged)
 
-    def _look(self, state: FilterState, sample: Sample) -> "Innovation":
+    def _look(self, state: FilterState, sample: Sample) -> Innovation:
         """What `sample` shows, what the gate refuses left out."""
         process = self.process
         ways = jnp.zeros(len(self.x_root), state.x.dtype)
@@ -140,24 +150,9 @@ class AbstractFilter(eqx.Module):
         C = jnp.concatenate([by_change, by_theta], axis=1)
         R_root = self.R_root if sample.scale is None else sample.scale[:, None] * self.R_root
         innovation = process.innovation(sample.outputs, expected)
-        believed = self.gate(state.refused, innovation, self.form.innovation_deviations(state.joint, C, R_root))
-        mask = sample.mask & believed
-        return Innovation(jnp.where(mask, innovation, 0.0), mask, C, R_root)
-
-
-class Innovation(eqx.Module):
-    """What a sample shows that was not expected.
-
-    **Fields**
-
-    - `value`: (c,) zero where missing or refused; `mask`: (c,) true elsewhere.
-    - `C`: (c, q) Jacobian of the outputs by [x, θ]. `R_root`: (c, c) factor of the sensors' covariance.
-    """
-
-    value: Float[Array, " c"]
-    mask: Bool[Array, " c"]
-    C: Float[Array, "c q"]
-    R_root: Float[Array, "c c"]
+        covariance = self.form.seen(state.joint, C) + R_root @ R_root.T
+        mask = sample.mask & self.gate(state.refused, innovation, jnp.sqrt(jnp.diag(covariance)))
+        return Innovation(jnp.where(mask, innovation, 0.0), mask, C, R_root, covariance)
 
 
 def on_line(filter: AbstractFilter) -> Callable[[FilterState, Sample], tuple[FilterState, Estimate]]:
@@ -187,6 +182,10 @@ class ExtendedKalmanFilter(AbstractFilter):
         x, joint, _ = augmented_predict(self, state, sample, G)
         return dataclasses.replace(state, x=x, joint=joint)
 
+    def widened(self, state: FilterState, G: Float[Array, "s m"]) -> FilterState:
+        """The parameters gather none of it."""
+        return dataclasses.replace(state, joint=augmented_widened(self, state, G))
+
     def correct(self, state: FilterState, seen: Innovation) -> tuple[FilterState, Float[Array, "c c"]]:
         """The augmented update."""
         s = len(self.x_root)
@@ -209,8 +208,18 @@ def augmented_predict(
 
     _, F, by_theta = linearised(change_after, jnp.zeros(len(filter.x_root), x.dtype), state.theta)
     whole = jnp.block([[F, by_theta], [jnp.zeros_like(by_theta.T), jnp.eye(p, dtype=F.dtype)]])
-    noise = jnp.concatenate([G, jnp.zeros((p, G.shape[1]), G.dtype)])
-    return x, filter.form.predict(state.joint, whole, noise), F
+    return x, filter.form.predict(state.joint, whole, _of_state(G, p)), F
+
+
+def augmented_widened(filter: AbstractFilter, state: FilterState, G: Float[Array, "s m"]) -> Float[Array, "q q"]:
+    """What is kept of the uncertainty of [x, θ] with that of G in x added."""
+    q = len(state.joint)
+    return filter.form.predict(state.joint, jnp.eye(q, dtype=G.dtype), _of_state(G, state.theta.size))
+
+
+def _of_state(G: Float[Array, "s m"], p: int) -> Float[Array, "q m"]:
+    """Noise of x as noise of [x, θ]."""
+    return jnp.concatenate([G, jnp.zeros((p, G.shape[1]), G.dtype)])
 
 
 def _strong(state: FilterState) -> FilterState:

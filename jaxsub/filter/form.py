@@ -37,10 +37,8 @@ class AbstractForm(eqx.Module):
         """Gain, lower-triangular factor of the innovation's covariance, and what is kept after the measurement."""
 
     @abc.abstractmethod
-    def innovation_deviations(
-        self, kept: Float[Array, "n n"], C: Float[Array, "c n"], R_root: Float[Array, "c c"]
-    ) -> Float[Array, " c"]:
-        """Standard deviations of measured minus expected: roots of the diagonal of C P Cᵀ + R."""
+    def seen(self, kept: Float[Array, "n n"], C: Float[Array, "c n"]) -> Float[Array, "c c"]:
+        """C P Cᵀ."""
 
     @abc.abstractmethod
     def restart(self, root: Float[Array, "n n"], kept: Float[Array, "q q"]) -> Float[Array, "q q"]:
@@ -75,11 +73,10 @@ class SquareRoot(AbstractForm):
         """The paper's update."""
         return update(kept, C, R_root, mask)
 
-    def innovation_deviations(
-        self, kept: Float[Array, "n n"], C: Float[Array, "c n"], R_root: Float[Array, "c c"]
-    ) -> Float[Array, " c"]:
-        """Lengths of the rows of [C J, Rᶜ]."""
-        return jnp.linalg.norm(jnp.concatenate([C @ kept, R_root], axis=1), axis=1)
+    def seen(self, kept: Float[Array, "n n"], C: Float[Array, "c n"]) -> Float[Array, "c c"]:
+        """C J squared."""
+        CJ = C @ kept
+        return CJ @ CJ.T
 
     def restart(self, root: Float[Array, "n n"], kept: Float[Array, "q q"]) -> Float[Array, "q q"]:
         """The root of the marginal is made of the rows of J."""
@@ -111,11 +108,9 @@ class Covariance(AbstractForm):
         """P⁺ = (I - K C) P."""
         return covariance_update(kept, C, R_root, mask)
 
-    def innovation_deviations(
-        self, kept: Float[Array, "n n"], C: Float[Array, "c n"], R_root: Float[Array, "c c"]
-    ) -> Float[Array, " c"]:
-        """Roots of the diagonal of C P Cᵀ + R."""
-        return jnp.sqrt(jnp.sum((C @ kept) * C, axis=1) + jnp.sum(R_root**2, axis=1))
+    def seen(self, kept: Float[Array, "n n"], C: Float[Array, "c n"]) -> Float[Array, "c c"]:
+        """From P itself."""
+        return C @ kept @ C.T
 
     def restart(self, root: Float[Array, "n n"], kept: Float[Array, "q q"]) -> Float[Array, "q q"]:
         """The marginal is a block of P."""

@@ -7,13 +7,14 @@ of the state is not used. Source: Chui, Chen and Chui (1990), IEEE Trans. Automa
 
 import dataclasses
 
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .ekf import AbstractFilter, FilterState, Innovation, augmented_predict
+from .ekf import AbstractFilter, FilterState, augmented_predict, augmented_widened
 from .form import AbstractForm, SquareRoot
 from .gate import AbstractGate, Open
 from .model import AbstractProcess, Sample
-from .noise import AbstractNoiseRule, Residuals
+from .noise import AbstractNoiseRule, Innovation, Residuals
 
 
 class ModifiedKalmanFilter(AbstractFilter):
@@ -35,6 +36,12 @@ class ModifiedKalmanFilter(AbstractFilter):
         x, joint, F = augmented_predict(self, state, sample, G)
         assert state.own is not None
         return dataclasses.replace(state, x=x, joint=joint, own=self.form.predict(state.own, F, G))
+
+    def widened(self, state: FilterState, G: Float[Array, "s m"]) -> FilterState:
+        """Both filters are told."""
+        assert state.own is not None
+        own = self.form.predict(state.own, jnp.eye(len(state.own), dtype=G.dtype), G)
+        return dataclasses.replace(state, joint=augmented_widened(self, state, G), own=own)
 
     def correct(self, state: FilterState, seen: Innovation) -> tuple[FilterState, Float[Array, "c c"]]:
         """I corrects the state and II the parameters, from one innovation."""

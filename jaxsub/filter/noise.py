@@ -12,6 +12,23 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 
+class Innovation(eqx.Module):
+    """What a sample shows that was not expected.
+
+    **Fields**
+
+    - `value`: (c,) zero where missing or refused; `mask`: (c,) true elsewhere.
+    - `C`: (c, q) Jacobian of the outputs by [x, θ]. `R_root`: (c, c) factor of the sensors' covariance.
+    - `covariance`: (c, c) of the innovation, as if nothing was missing.
+    """
+
+    value: Float[Array, " c"]
+    mask: Bool[Array, " c"]
+    C: Float[Array, "c q"]
+    R_root: Float[Array, "c c"]
+    covariance: Float[Array, "c c"]
+
+
 class Residuals(eqx.Module):
     """What the last measurement did.
 
@@ -33,7 +50,8 @@ class Residuals(eqx.Module):
         """Those before the first measurement of a state of uncertainty `x_root` by channels of noise `R_root`."""
         s, c = len(x_root), len(R_root)
         kind = x_root.dtype
-        return cls(jnp.zeros(c, kind), jnp.zeros(c, bool), R_root, jnp.zeros((s, c), kind), jnp.zeros(s, kind))
+        nothing, none = jnp.zeros(c, kind), jnp.zeros(c, bool)
+        return cls(nothing, none, R_root, jnp.zeros((s, c), kind), jnp.zeros(s, kind))
 
 
 class AbstractNoiseRule(eqx.Module):
@@ -46,6 +64,13 @@ class AbstractNoiseRule(eqx.Module):
     @abc.abstractmethod
     def __call__(self, memory: Any, residuals: Residuals, elapsed: Float[Array, ""]) -> tuple[Any, Float[Array, "s m"]]:
         """The memory, and a square root of the covariance that the state gathers in the next `elapsed` seconds."""
+
+    def surprise(self, memory: Any, seen: Innovation) -> tuple[Any, Float[Array, "s m"]] | None:
+        """The memory, and a root of what the state must have gathered besides, now that `seen` is known.
+
+        Asked after every sample, before it corrects the state; by default a rule learns only afterwards.
+        """
+        return None
 
 
 class ConstantNoise(AbstractNoiseRule):
