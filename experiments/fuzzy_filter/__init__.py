@@ -1,0 +1,1 @@
+"""The second paper re-examined: its filter, its claims, and the same filter on real recordings."""

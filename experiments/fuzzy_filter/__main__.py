@@ -1,0 +1,27 @@
+"""`python -m experiments.fuzzy_filter --out DIR [--quick]`: the second paper's filter, its claims and its uses, measured.
+
+Writes `results.json` and figures, among them such as the paper's 2 to 9. Parts that need real recordings say so and
+are empty where there are none.
+"""
+
+import importlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..parts import main
+
+_PARTS = ("regression", "pitch", "broad", "ansfl", "realtime", "throughput", "precision", "submerged")
+
+
+def part(name: str, out: Path, quick: bool) -> dict:
+    """One part's results."""
+    return importlib.import_module(f".{name}", __package__).run(out, quick)
+
+
+def assembled(found: Mapping[str, dict]) -> dict:
+    """The bench's comparison, its claims and its consistency at the top, and beside them the other parts by name."""
+    return {**found["pitch"], **{name: found[name] for name in _PARTS if name != "pitch"}}
+
+
+if __name__ == "__main__":
+    main("experiments.fuzzy_filter", __doc__, _PARTS, part, assembled)

@@ -1,0 +1,50 @@
+"""An experiment of several parts: each runs in a process of its own, and one that is done is not run again.
+
+So an interrupted run goes on where it stopped. `DIR/parts` holds what each part found, `DIR/results.json` all of them.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from jaxsub.cli import session
+
+Part = Callable[[str, Path, bool], dict]
+
+
+def main(
+    package: str,
+    about: str | None,
+    names: Sequence[str],
+    part: Part,
+    assembled: Callable[[Mapping[str, dict]], dict] = dict,
+) -> None:
+    """Run those of the parts `names` that are missing and write their results, as `assembled` puts them together."""
+    parser = argparse.ArgumentParser(prog=f"python -m {package}", description=about)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--quick", action="store_true", help="few seeds and starts: minutes, and wide intervals")
+    parser.add_argument("--part", choices=names, help="this part alone, in this process")
+    chosen = parser.parse_args()
+    folder = chosen.out / "parts"
+    folder.mkdir(parents=True, exist_ok=True)
+    if chosen.part:
+        session.start()
+        begin = time.perf_counter()
+        found = part(chosen.part, chosen.out, chosen.quick)
+        found["part_seconds"] = time.perf_counter() - begin
+        (folder / f"{chosen.part}.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+        return
+    for name in names:
+        if (folder / f"{name}.json").exists():
+            session.console.print(f"{name}: already in {folder}", highlight=False)
+            continue
+        session.console.print(f"{name} …", highlight=False)
+        command = [sys.executable, "-m", package, "--out", str(chosen.out), "--part", name]
+        subprocess.run([*command, *(["--quick"] if chosen.quick else [])], check=True)
+    found = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in names}
+    (chosen.out / "results.json").write_text(json.dumps(assembled(found), indent=1), encoding="utf-8")
+    session.console.print(f"results: {chosen.out / 'results.json'}", highlight=False)
