@@ -45,6 +45,8 @@ def main(
         session.console.print(f"{name} …", highlight=False)
         command = [sys.executable, "-m", package, "--out", str(chosen.out), "--part", name]
         subprocess.run([*command, *(["--quick"] if chosen.quick else [])], check=True)
-    found = {name: json.loads((folder / f"{name}.json").read_text(encoding="utf-8")) for name in names}
+    written = {name: folder / f"{name}.json" for name in names}
+    # a part whose recordings are not here says so and ends without a result
+    found = {name: json.loads(path.read_text(encoding="utf-8")) for name, path in written.items() if path.exists()}
     (chosen.out / "results.json").write_text(json.dumps(assembled(found), indent=1), encoding="utf-8")
     session.console.print(f"results: {chosen.out / 'results.json'}", highlight=False)

@@ -13,7 +13,7 @@ from jaxsub.estimate import Rate
 from .pitch_runs import Runs
 from .bench import DEGREE, INTERVAL, TURN
 
-_NOISE = (14.1, 35.1, 44.6)  # the angles of Figs 6 to 8
+COMPARED = (14.1, 35.1, 44.6)  # the angles of Figs 6 to 8
 PerSeed = Mapping[tuple[float, str], Mapping[str, np.ndarray]]
 
 
@@ -56,7 +56,7 @@ def _smaller_deviates_more(per_seed: PerSeed) -> dict:
 def _compared(per_seed: PerSeed, text: str, metric: str, ratio: float | None) -> dict:
     """`metric` of the two rules at the angles of Figs 6 to 8; an overshoot is claimed larger, the others smaller."""
     told, holds = {}, True
-    for a in _NOISE:
+    for a in COMPARED:
         fuzzy, random = per_seed[a, "fuzzy"][metric], per_seed[a, "random"][metric]
         rate = Rate(int(np.sum(fuzzy > (ratio or 1.0) * random if ratio else fuzzy < random)), len(fuzzy))
         told[a] = {
@@ -73,7 +73,7 @@ def _compared(per_seed: PerSeed, text: str, metric: str, ratio: float | None) ->
 
 def _steady(per_seed: PerSeed) -> dict:
     told, holds = {}, True
-    for a in _NOISE:
+    for a in COMPARED:
         fuzzy, random = (np.abs(per_seed[a, name]["steady_mean_deg"]) for name in ("fuzzy", "random"))
         rate = Rate(int(np.sum(random > fuzzy)), len(fuzzy))
         over = Rate(int(np.sum(per_seed[a, "random"]["steady_mean_deg"] > 0.0)), len(fuzzy))
@@ -85,7 +85,7 @@ def _steady(per_seed: PerSeed) -> dict:
 def _from_below(traces: Mapping[tuple[float, str], Runs]) -> dict:
     """The random rule's estimate below the fuzzy rule's in the first 5 s, above zero error at some time after."""
     told, holds = {}, True
-    for a in _NOISE:
+    for a in COMPARED:
         early = slice(TURN, TURN + round(5.0 / INTERVAL))
         fuzzy, random = traces[a, "fuzzy"].pitch, traces[a, "random"].pitch
         below = np.mean(random[:, early] - fuzzy[:, early], axis=1) < 0.0

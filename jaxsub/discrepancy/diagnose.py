@@ -18,6 +18,7 @@ from .columns import Trajectory, facts
 from .diagnosis import Diagnosis, Location, Physics, Rival, Verdict
 from .locate import Field, effect_share, locate, locations
 from .name import Naming, Step, certain, name
+from .process_noise import noise_note, noise_signals
 from .refit import SIGNIFICANCE, Progress
 from .show import HeldOut, channel_quality, coefficients, estimates, hold, overlays, record_sigma, run_quality
 from .whiteness import whiteness_p_value
@@ -59,7 +60,8 @@ def diagnose(
         raise InputError(layout.name, "the model does not run from its starting values", remedy)
     path = Trajectory.of(baseline)
     progress("locating the mismatch")
-    field = locate(baseline, path, train)
+    signals = noise_signals(baseline, train)
+    field = locate(baseline, path, train, signals)
     naming = name(baseline, vehicle, lambda found: candidates(facts(vehicle, found), vocabulary), progress)
     progress("free runs through what the fit did not see")
     chosen = range(size, size + len(held))
@@ -90,7 +92,7 @@ def diagnose(
         coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, baseline, improved),
         channels=channel_quality(improved),
         runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
-        notes=judged.notes,
+        notes=[*judged.notes, *noise_note(signals)],
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
         history=[
             (label, {c: rms * float(s) for (c, rms), s in zip(seen.rms.items(), sigma, strict=True)})

@@ -21,11 +21,14 @@ from ..likelihood import force_columns
 from ..recording import Recording
 from .columns import Trajectory, candidate_columns, facts, stacked_force
 from .diagnosis import ForceTrace, Location
+from .process_noise import NoiseSignal
 from .scan import project
 
 HATS = 40
 _ROUNDS = 25
 _SIGNIFICANT = 2.5
+# of a force where the filter's process noise rises too
+_SUPPORTED = 1.5
 _SHOWN = 0.05
 
 
@@ -37,14 +40,16 @@ class Field:
 
     - `share`: by place, of the residual's squares that all places explain together.
     - `traces`: a `ForceTrace` a run, at the hats' centres.
+    - `signals`: a `NoiseSignal` a run, or none: where a filter needs more process noise than the model.
     """
 
     share: dict[str, float]
     traces: list[ForceTrace]
+    signals: Sequence[NoiseSignal] = ()
 
 
-def locate(fit: Fit, path: Trajectory, recordings: Sequence[Recording]) -> Field:
-    """The missing forces of a fit."""
+def locate(fit: Fit, path: Trajectory, recordings: Sequence[Recording], signals: Sequence[NoiseSignal] = ()) -> Field:
+    """The missing forces of a fit, with what a filter's process noise said of when and in which equation."""
     equations = fit.vehicle.layout.equations
     hats = _hats(fit)
     suspects = candidates(facts(fit.vehicle, fit), (ActuatorLag, SensorBias, SensorScale, SensorDrift))
@@ -67,7 +72,7 @@ def locate(fit: Fit, path: Trajectory, recordings: Sequence[Recording]) -> Field
         force = {e: mean[run][s] / size[s] for e, s in pick.items()}
         band = {e: spread[run][s] / size[s] for e, s in pick.items()}
         traces.append(ForceTrace(recording.name, t, force, band))
-    return Field(share, traces)
+    return Field(share, traces, signals)
 
 
 def _hats(fit: Fit) -> Array:
@@ -125,7 +130,7 @@ def locations(
         if part < _SHOWN:
             continue
         if place in fit.vehicle.layout.equations:
-            times = [hit for trace in field.traces for hit in _intervals(trace, place)]
+            times = [hit for trace in field.traces for hit in _intervals(trace, place, field.signals)]
             grows = grows_with(fit, path, place)
         else:
             times = [(r.name, float(r.times[0]), float(r.times[-1])) for r in recordings]
@@ -134,9 +139,13 @@ def locations(
     return found
 
 
-def _intervals(trace: ForceTrace, equation: str) -> list[tuple[str, float, float]]:
-    """Times at which a force stands clear of its band, neighbouring hats joined."""
-    clear = np.abs(trace.force[equation]) > _SIGNIFICANT * trace.band[equation]
+def _intervals(trace: ForceTrace, equation: str, signals: Sequence[NoiseSignal]) -> list[tuple[str, float, float]]:
+    """Times at which a force stands clear of its band, neighbouring hats joined; less clear where a filter agrees."""
+    size = np.abs(trace.force[equation]) / np.maximum(trace.band[equation], 1e-300)
+    clear = size > _SIGNIFICANT
+    for signal in signals:
+        if signal.run == trace.run:
+            clear |= (size > _SUPPORTED) & signal.rises(equation, trace.times)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], clear.astype(int), [0]])))
     half = 0.5 * (trace.times[1] - trace.times[0])
     low, high = trace.times[0], trace.times[-1]

@@ -6,6 +6,7 @@ from .ekf import AbstractFilter, Estimate, ExtendedKalmanFilter, FilterState, on
 from .form import AbstractForm, Covariance, SquareRoot
 from .fuzzy import FuzzyNoise
 from .gate import AbstractGate, InnovationGate, Open
+from .late import DelayedFilter, Late, Past
 from .mekf import ModifiedKalmanFilter
 from .model import AbstractProcess, Sample, linearised
 from .noise import AbstractNoiseRule, ConstantNoise, Innovation, Residuals
@@ -23,6 +24,7 @@ __all__ = [
     "ConsistentFuzzyNoise",
     "ConstantNoise",
     "Covariance",
+    "DelayedFilter",
     "Drive",
     "Estimate",
     "ExtendedKalmanFilter",
@@ -33,8 +35,10 @@ __all__ = [
     "Innovation",
     "InnovationGate",
     "InnovationNoise",
+    "Late",
     "ModifiedKalmanFilter",
     "Open",
+    "Past",
     "RandomNoise",
     "Residuals",
     "SageHusaNoise",

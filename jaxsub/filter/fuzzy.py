@@ -1,8 +1,9 @@
 r"""Process noise from fuzzy regression on the state's residuals (equations.md §5, the second paper's section 4).
 
 $\Delta x$ is what a measurement corrects the state by; over a moving window it is fitted by Tanaka's line
-$\Delta x(t) = A_0 + A_1 t$ with fuzzy $A_i$, whose slope is $\Delta\dot x$. Then $Q_{ii} = |\Delta x_i\,\Delta\dot x_i|\,\Delta t$,
-which is read here as a density $|\Delta x_i\,\Delta\dot x_i|$ over the time $\Delta t$ that passes.
+$\Delta x(t) = A_0 + A_1 t$ with fuzzy $A_i$, whose slope is $\Delta\dot x$. Then
+$Q_{ii} = |\Delta x_i\,\Delta\dot x_i|\,\Delta t$, which is read here as a density $|\Delta x_i\,\Delta\dot x_i|$
+over the time $\Delta t$ that passes.
 """
 
 import equinox as eqx
@@ -20,8 +21,8 @@ class FuzzyNoise(AbstractNoiseRule):
 
     **Fields**
 
-    - `least`, `most`: (s,) root of the limits of the density, state units per root second. Without a least one Q feeds on
-      corrections that it has itself made small.
+    - `least`, `most`: (s,) root of the limits of the density, state units per root second. Without a least one Q feeds
+      on corrections that it has itself made small.
     - `level`: h of the regression. `width`: measurements in the window.
     """
 
@@ -44,4 +45,4 @@ class FuzzyNoise(AbstractNoiseRule):
         line = jax.vmap(fuzzy_line, in_axes=(None, 1, None, None))(window.times, window.values, window.held, self.level)
         steep = jnp.abs(residuals.correction * line.centre[:, 1])
         density = jnp.where(fresh, jnp.clip(steep, self.least**2, self.most**2), density)
-        return (window.on(elapsed), density), jnp.diag(jnp.sqrt(density * elapsed))
+        return (window.on(elapsed), density), jnp.diag(jnp.sqrt(density) * jnp.sqrt(elapsed))

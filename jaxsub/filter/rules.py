@@ -78,7 +78,7 @@ class Learnt(eqx.Module):
 
 
 class SageHusaNoise(AbstractNoiseRule):
-    r"""$Q \leftarrow Q + d\,[K\nu\nu^TK^T - KSK^T]$, the diagonal of it, with $d = (1-b)/(1-b^{k+1})$ in the limit $1-b$.
+    r"""The diagonal of $Q \leftarrow Q + d\,[K\nu\nu^TK^T - KSK^T]$ with $d = (1-b)/(1-b^{k+1})$ in the limit $1-b$.
 
     Sage and Husa's $K\nu\nu^TK^T + P^+ - \Phi P\Phi^T$ with $P^+ = P^- - KSK^T$ and $P^- = \Phi P\Phi^T + Q$: at rest
     where innovations are as large as the filter says.
@@ -108,7 +108,7 @@ class SageHusaNoise(AbstractNoiseRule):
         surplus = residuals.correction**2 - jnp.sum((residuals.gain @ residuals.factor) ** 2, axis=1)
         learnt = memory.density + (1.0 - self.forgetting) * surplus / since
         density = jnp.where(fresh, jnp.clip(learnt, self.least**2, self.most**2), memory.density)
-        return Learnt(density, memory.clock.on(residuals, elapsed)), jnp.diag(jnp.sqrt(density * elapsed))
+        return Learnt(density, memory.clock.on(residuals, elapsed)), jnp.diag(jnp.sqrt(density) * jnp.sqrt(elapsed))
 
 
 class Window(eqx.Module):
@@ -148,9 +148,12 @@ class Window(eqx.Module):
 class InnovationNoise(AbstractNoiseRule):
     r"""$Q = K\hat C_\nu K^T$ with $\hat C_\nu$ the mean of $\nu\nu^T$ over the last w measurements.
 
+    A density is made of it by the mean time between those measurements: two stamps that nearly coincide then make no
+    storm of noise. Each channel's mean is over the measurements that had it.
+
     **Fields**
 
-    - `least`: (s,) root of the least density, state units per root second; it is all there is before the first innovation.
+    - `least`: (s,) root of the least density, state units per root second; until the first innovation it is all.
     - `channels`, `width`: of the measurement, and of the window.
 
     Source: Mohamed and Schwarz (1999), Adaptive Kalman filtering for INS/GPS, J. Geodesy 73, eq. 26 in steady state.
@@ -161,18 +164,24 @@ class InnovationNoise(AbstractNoiseRule):
     width: int = eqx.field(static=True, default=15)
 
     def start(self) -> tuple[Window, Clock, Float[Array, "s w"]]:
-        """An empty window."""
-        root = jnp.zeros((self.least.size, self.width), self.least.dtype)
-        return Window.start(self.width, jnp.zeros(self.channels, self.least.dtype)), Clock.start(self.least), root
+        """An empty window, of innovations, which channels they had, and the time before each."""
+        kind = self.least.dtype
+        root = jnp.zeros((self.least.size, self.width), kind)
+        return Window.start(self.width, jnp.zeros(2 * self.channels + 1, kind)), Clock.start(self.least), root
 
     def __call__(
         self, memory: tuple[Window, Clock, Float[Array, "s w"]], residuals: Residuals, elapsed: Float[Array, ""]
     ) -> tuple[tuple[Window, Clock, Float[Array, "s w"]], Float[Array, "s k"]]:
-        """K [ν₁ … ν_w]/√w, whose square is K Ĉ Kᵀ, beside the least density."""
+        """K [ν₁ … ν_w]/√w, whose square is K Ĉ Kᵀ, beside what its diagonal is short of the least density."""
         window, clock, root = memory
         fresh, since = clock.heard(residuals)
-        window = window.with_newest(residuals.innovation, fresh)
-        count = jnp.maximum(jnp.sum(window.held), 1)
-        root = jnp.where(fresh, residuals.gain @ window.values.T / jnp.sqrt(count * since), root)
-        whole = jnp.concatenate([root, jnp.diag(self.least)], axis=1) * jnp.sqrt(elapsed)
+        window = window.with_newest(jnp.concatenate([residuals.innovation, residuals.mask, since[None]]), fresh)
+        innovations, had, before = jnp.split(window.values, (self.channels, 2 * self.channels), axis=1)
+        interval = jnp.sum(before) / jnp.maximum(jnp.sum(window.held), 1)
+        weight = jnp.maximum(jnp.sum(had, axis=0), 1.0) * jnp.where(fresh, interval, 1.0)
+        root = jnp.where(fresh, residuals.gain @ (innovations / jnp.sqrt(weight)).T, root)
+        # what is short of the least and not the least itself: added to every Q it would grow in the loop with the gain
+        short = self.least**2 - jnp.sum(root**2, axis=1)
+        filling = jnp.where(short > 0.0, jnp.sqrt(jnp.where(short > 0.0, short, 1.0)), 0.0)
+        whole = jnp.concatenate([root, jnp.diag(filling)], axis=1) * jnp.sqrt(elapsed)
         return (window.on(elapsed), clock.on(residuals, elapsed), root), whole

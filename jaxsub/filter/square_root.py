@@ -13,10 +13,35 @@ from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
 
+# rows that are reflected one by one: LAPACK takes a batch's matrices one by one
+_UNROLLED = 10
+
+
 def by_qr(M: Float[Array, "n m"]) -> Float[Array, "n n"]:
     """The lower-triangular J of non-negative diagonal with J Jᵀ = M Mᵀ, m ≥ n: the R factor of Mᵀ."""
-    R = jnp.linalg.qr(M.T, mode="r")
-    return jnp.where(jnp.diag(R) < 0.0, -1.0, 1.0) * R.T
+    if not 0 < len(M) <= _UNROLLED:
+        R = jnp.linalg.qr(M.T, mode="r")
+        return jnp.where(jnp.diag(R) < 0.0, -1.0, 1.0) * R.T
+    columns = []
+    for k in range(len(M)):
+        column, M = _reflected(M)
+        columns.append(jnp.concatenate([jnp.zeros(k, column.dtype), column]))
+    return jnp.stack(columns, axis=1)
+
+
+def _reflected(M: Float[Array, "n m"]) -> tuple[Float[Array, " n"], Float[Array, "l k"]]:
+    """The first column of M and what is left below and beside it, after a Householder reflection of its first row."""
+    a = M[0]
+    squared = a @ a
+    none = squared == 0.0
+    length = jnp.sqrt(jnp.where(none, 1.0, squared))
+    sign = jnp.where(a[0] < 0.0, -1.0, 1.0)
+    # LAPACK's scaling, the most exact of several in 32 bits: the vector that is turned round is [1, v]
+    pivot = a[0] + sign * length
+    v = a[1:] / pivot
+    share = jnp.abs(pivot) / length * (M[1:, 0] + M[1:, 1:] @ v)
+    column = jnp.concatenate([length[None], sign * (share - M[1:, 0])])
+    return jnp.where(none, M[:, 0], column), M[1:, 1:] - share[:, None] * v
 
 
 def by_svd(M: Float[Array, "n m"]) -> Float[Array, "n n"]:
@@ -49,12 +74,14 @@ def update(
     Source: the manoeuvring paper, section 5; Andrews (1968), AIAA J. 6.
     """
     C, R_root = present(C, R_root, mask)
-    CJ = C @ J
-    L = by_qr(jnp.concatenate([CJ, R_root], axis=1))
-    W = solve_triangular(L, CJ, lower=True).T
-    JW = J @ W
-    gain = solve_triangular(L, JW.T, lower=True, trans=1).T
-    return gain, L, J - JW @ solve_triangular(L + R_root, CJ, lower=True)
+    rows, columns = jnp.concatenate([C @ J, J]), []
+    for k in range(len(C)):
+        noise = jnp.concatenate([R_root[k:, k], jnp.zeros(len(J), J.dtype)])
+        column, rows = _reflected(jnp.concatenate([noise[:, None], rows], axis=1))
+        columns.append(jnp.concatenate([jnp.zeros(k, J.dtype), column]))
+    whole = jnp.stack(columns, axis=1)
+    L, W = whole[: len(C)], whole[len(C) :]
+    return solve_triangular(L, W.T, lower=True, trans=1).T, L, rows
 
 
 def covariance_update(

@@ -1,1 +1,47 @@
-"""Navigation: attitude and position of a body from gyros, accelerometers and satellite fixes."""
+"""Where a vehicle is and how it lies: attitude and position filters, constructed attitude, strapdown navigation, streams."""
+
+from .alignment import Alignment, MagneticField, aligned
+from .attitude import Gyro, PaperAttitude, RotationAttitude
+from .constructed import (
+    ConstructedAttitude,
+    ConstructedAttitudeStream,
+    Limits,
+    constructed_attitude,
+    constructed_over,
+    standard_deviations,
+)
+from .navigator import FlightReading, Navigated, NavigatorState, PaperNavigator
+from .position import Course, DeadReckoning
+from .strapdown import Inertial, SensorNoise, StrapdownNavigation
+from .stream import AbstractStream, Faults, Reading, Stream, StreamState, ahead_of_time, follow
+
+__all__ = [
+    "AbstractStream",
+    "Alignment",
+    "ConstructedAttitude",
+    "ConstructedAttitudeStream",
+    "Course",
+    "DeadReckoning",
+    "Faults",
+    "FlightReading",
+    "Gyro",
+    "Inertial",
+    "Limits",
+    "MagneticField",
+    "Navigated",
+    "NavigatorState",
+    "PaperAttitude",
+    "PaperNavigator",
+    "Reading",
+    "RotationAttitude",
+    "SensorNoise",
+    "StrapdownNavigation",
+    "Stream",
+    "StreamState",
+    "ahead_of_time",
+    "aligned",
+    "constructed_attitude",
+    "constructed_over",
+    "follow",
+    "standard_deviations",
+]

@@ -1,0 +1,215 @@
+r"""When, and in which equation, a filter needs more process noise than its model: missing physics as a filter feels it.
+
+An extended Kalman filter with all coefficients known follows each run. Its noise has a constant density $Q_0$ and on
+top of it the fuzzy rule's $|\Delta x_i\,\Delta\dot x_i|$. Without $Q_0$ the rule falls asleep: the gain is small, so
+are the corrections, and with them Q. The rule's part over that of clean simulations of the same vehicle on the same
+inputs, both averaged over some seconds, is near one where the model is right, at any time and in any equation.
+
+Source: the second paper, eq. 18; the threshold is a Monte-Carlo test's (Barnard 1963, J. Royal Stat. Soc. B 25).
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from ..effects import AbstractActuator
+from ..estimate import Fit
+from ..filter import (
+    AbstractNoiseRule,
+    ConstantNoise,
+    ExtendedKalmanFilter,
+    FilterState,
+    FuzzyNoise,
+    Residuals,
+    Sample,
+    VehicleProcess,
+    samples,
+    state_scale,
+)
+from ..recording import Recording
+from ..recording.runs import Runs
+from ..simulate import simulate
+from ..vehicle import AbstractVehicle
+
+ALARM_RATE = 0.05
+# Q₀ per root second in sensors' sigmas: with less the filter's uncertainty is slow to follow, with more it corrects so
+# much at once that a small force drowns in the sensors' noise
+_FLOOR = 0.1
+_LEAST, _MOST = 1e-4, 10.0
+# the start that a fit found has missing physics in it: the filter takes its own from the first samples
+_VAGUE = 10.0
+# measurements in the rule's window; samples in the average, and to settle in
+_WIDTH, _WINDOW, _SETTLED = 10, 50, 25
+_SEED = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class NoiseSignal:
+    """How the process noise of one run compares with that of clean simulations.
+
+    **Fields**
+
+    - `times`: (k,) s on the recording's clock. `window`: s over which densities are averaged.
+    - `std`: by equation, (k,) root of the density of Q_ii, state units per root second.
+    - `ratio`: by equation, (k,) the rule's part of Q_ii, averaged, over that of clean simulations at the same time.
+    - `threshold`: of the ratio; clean recordings exceed it anywhere, in any equation or run, at the rate `ALARM_RATE`.
+    """
+
+    run: str
+    times: np.ndarray
+    window: float
+    std: dict[str, np.ndarray]
+    ratio: dict[str, np.ndarray]
+    threshold: float
+
+    def rises(self, equation: str, times: np.ndarray) -> np.ndarray:
+        """At which of `times` (j,) the ratio of an equation is above the threshold, (j,) booleans."""
+        return np.interp(times, self.times, self.ratio[equation]) > self.threshold
+
+    def intervals(self, equation: str) -> list[tuple[float, float]]:
+        """Start and end (s) of the times above the threshold; gaps shorter than the averaging window are closed."""
+        above = self.times[self.ratio[equation] > self.threshold]
+        if not above.size:
+            return []
+        cuts = np.flatnonzero(np.diff(above) > self.window) + 1
+        return [(float(part[0]), float(part[-1])) for part in np.split(above, cuts)]
+
+    def ranked(self) -> list[str]:
+        """Equations above the threshold at some time, the highest ratio first."""
+        peak = {equation: float(np.max(ratio)) for equation, ratio in self.ratio.items()}
+        return sorted((e for e in peak if peak[e] > self.threshold), key=lambda e: -peak[e])
+
+
+def noise_signals(fit: Fit, recordings: Sequence[Recording], copies: int = 19) -> list[NoiseSignal]:
+    """The signal of each run of a fit, calibrated on clean `copies` of all runs, of which 19 are the fewest.
+
+    None where no filter can follow: a vehicle with an effect on an actuator, or a run on which the filter diverges.
+    """
+    vehicle = fit.vehicle
+    if any(isinstance(effect, AbstractActuator) for effect in vehicle.effects):
+        return []
+    densities = noise_densities(vehicle, fit.runs, fit.start, fit.sigma, copies)
+    clean, recorded = (np.asarray(density) for density in densities)
+    if not (np.isfinite(clean).all() and np.isfinite(recorded).all()):
+        return []
+    lengths = np.asarray(fit.runs.live).sum(1) + 1
+    ratios, threshold = calibrated(clean, recorded, lengths)
+    std = np.sqrt(recorded + np.asarray(floor(vehicle, fit.sigma)) ** 2)
+    signals = []
+    for run, recording in enumerate(recordings):
+        k, window = int(lengths[run]), _WINDOW * float(np.median(np.diff(recording.times)))
+        of = lambda values, run=run, k=k: dict(zip(vehicle.layout.equations, values[run, :k].T, strict=True))
+        signals.append(NoiseSignal(recording.name, recording.times, window, of(std), of(ratios), threshold))
+    return signals
+
+
+def noise_note(signals: Sequence[NoiseSignal]) -> list[str]:
+    """One line: the equations and times where the filter's process noise rises; none without signals."""
+    if not signals:
+        return []
+    clean = f"clean runs do so anywhere with probability {ALARM_RATE:g}"
+    risen = [
+        f"{equation} ({signal.run}: {', '.join(f'{a:.0f} to {b:.0f} s' for a, b in signal.intervals(equation))})"
+        for signal in signals
+        for equation in signal.ranked()
+    ]
+    if not risen:
+        return [f"The filter's process noise rises in no equation; {clean}."]
+    return [f"The filter's process noise rises in {'; '.join(risen)}; {clean}."]
+
+
+def calibrated(
+    clean: Float[np.ndarray, "m r k n"], recorded: Float[np.ndarray, "r k n"], lengths: np.ndarray
+) -> tuple[Float[np.ndarray, "r k n"], float]:
+    """Averaged densities over the mean of the clean ones, and the threshold that clean runs cross at `ALARM_RATE`.
+
+    `lengths` (r,) are the samples of each run.
+    """
+    place = np.arange(recorded.shape[1])
+    live = (place < lengths[:, None]) & (place >= _SETTLED)
+    copies = _averaged(clean, live)
+    together = copies.sum(axis=0)
+    # a copy counts not among those that it is held against, as the recording does not
+    others = np.maximum((together - copies) / (len(copies) - 1), 1e-300)
+    highest = np.sort(np.max(copies / others, axis=(1, 2, 3), where=live[..., None], initial=0.0))
+    # were the recording clean, it would be as likely as any copy to be the highest
+    rank = int(np.ceil((1.0 - ALARM_RATE) * (len(copies) + 1) - 1e-9))
+    ratios = _averaged(recorded[None], live)[0] / np.maximum(together / len(copies), 1e-300)
+    return np.where(live[..., None], ratios, 0.0), float(highest[rank - 1])
+
+
+def _averaged(density: Float[np.ndarray, "m r k n"], live: Bool[np.ndarray, "r k"]) -> Float[np.ndarray, "m r k n"]:
+    """The mean of what is live over a centred window, which is shorter at the ends of a run."""
+    place = np.arange(density.shape[2])
+    first, last = np.maximum(place - _WINDOW // 2, 0), np.minimum(place + _WINDOW // 2, len(place))
+
+    def window(values: np.ndarray) -> np.ndarray:
+        sums = np.concatenate([np.zeros_like(values[:, :, :1]), np.cumsum(values, axis=2)], axis=2)
+        return sums[:, :, last] - sums[:, :, first]
+
+    weight = live[None, :, :, None].astype(float)
+    return window(density * weight) / np.maximum(window(weight), 1.0)
+
+
+class Above(AbstractNoiseRule):
+    """The noise of a `rule` on top of `constant` noise."""
+
+    constant: ConstantNoise
+    rule: AbstractNoiseRule
+
+    def start(self) -> Any:
+        """The rule's memory."""
+        return self.rule.start()
+
+    def __call__(self, memory: Any, residuals: Residuals, elapsed: Float[Array, ""]) -> tuple[Any, Float[Array, "s m"]]:
+        """Both roots side by side: the covariances add."""
+        _, beneath = self.constant((), residuals, elapsed)
+        memory, root = self.rule(memory, residuals, elapsed)
+        return memory, jnp.concatenate([beneath, root], axis=1)
+
+
+def noise_filter(vehicle: AbstractVehicle, substeps: int, sigma: Float[Array, " c"]) -> ExtendedKalmanFilter:
+    """The extended Kalman filter of a vehicle whose numbers are all known, with fuzzy noise above a constant one."""
+    rows = tuple(dataclasses.replace(row, free=False) for row in vehicle.layout.parameters)
+    known = dataclasses.replace(vehicle, layout=dataclasses.replace(vehicle.layout, parameters=rows))
+    scale = state_scale(known, sigma)
+    constant = ConstantNoise(jnp.diag(_FLOOR * scale))
+    rule = Above(constant, FuzzyNoise(_LEAST * scale, _MOST * scale, width=_WIDTH))
+    return ExtendedKalmanFilter(VehicleProcess.of(known, substeps), rule, jnp.diag(sigma), jnp.diag(_VAGUE * scale))
+
+
+def floor(vehicle: AbstractVehicle, sigma: Float[Array, " c"]) -> Float[Array, " n"]:
+    """Root of the constant density beneath the rule's, of each equation."""
+    return _FLOOR * state_scale(vehicle, sigma)[: len(vehicle.layout.equations)]
+
+
+@eqx.filter_jit
+def noise_densities(
+    vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"], sigma: Float[Array, " c"], copies: int
+) -> tuple[Float[Array, "m r k n"], Float[Array, "r k n"]]:
+    """The rule's part of Q_ii a second of the n equations, for m clean `copies` of R runs and for the runs themselves.
+
+    `start` is the state at each run's first sample, `sigma` the sensors' noise, both SI; NaN once a filter diverged.
+    """
+    draws = jax.random.normal(jax.random.key(_SEED), (copies, *runs.outputs.shape), runs.outputs.dtype)
+    outputs = jnp.concatenate([simulate(vehicle, runs, start) + sigma * draws, runs.outputs[None]])
+    filter, beneath = noise_filter(vehicle, runs.substeps, sigma), floor(vehicle, sigma)
+
+    def step(state: FilterState, sample: Sample) -> tuple[FilterState, Array]:
+        after, estimate = filter.step(state, sample)
+        whole = estimate.noise_std[: beneath.size] ** 2 / jnp.where(sample.elapsed > 0.0, sample.elapsed, 1.0)
+        return after, jnp.where(estimate.diverged, jnp.nan, jnp.maximum(whole - beneath**2, 0.0))
+
+    def follow(x: Array, sequence: Sample) -> Array:
+        begin = filter.start(x, jnp.zeros(0, x.dtype), jnp.zeros((0, 0), x.dtype))
+        return jax.lax.scan(step, begin, sequence)[1]
+
+    every = lambda z: jax.vmap(follow)(start, samples(dataclasses.replace(runs, outputs=z)))
+    density = jax.vmap(every)(outputs)
+    return density[:-1], density[-1]

@@ -1,0 +1,100 @@
+"""The attitude of a body that is held still, from what its accelerometers and magnetometers show on average.
+
+The accelerometers show the vertical, $d = -f/|f|$ in body axes, and with it roll and pitch; the field then shows the
+heading. Source: Titterton and Weston (2004), §10.
+"""
+
+import math
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from .rotation import from_euler, matrix
+
+# the standard deviation of an angle that may be anything
+UNKNOWN = math.pi / math.sqrt(3.0)
+# m/s² below which a specific force has no direction
+_LEAST_FORCE = 1.0
+# the share of the field that must be horizontal; with less of it, dip above 87°, a small disturbance turns it anywhere
+_LEAST_SHARE = 0.05
+
+
+class MagneticField(eqx.Module):
+    r"""Earth's field as it should be, in the magnetometer's unit.
+
+    Something that disturbs it by a component turned away from magnetic north spoils the heading, and nothing shows how
+    large that component is. The other two are seen: how far the horizontal and the downward part are from what they
+    should be, together $d$. A disturbance of no preferred direction is expected to have $d^2/2$ in the third.
+
+    **Fields**
+
+    - `horizontal`, `down`: its parts. `spread`: standard deviation of each component from place to place.
+    """
+
+    horizontal: Float[Array, ""] | float
+    down: Float[Array, ""] | float
+    spread: Float[Array, ""] | float
+
+    def heading_std(self, seen: Float[Array, "3"]) -> Float[Array, ""]:
+        r"""$\sqrt{\sigma^2 + d^2/2}$ over the horizontal part of the field `seen`, north, east, down; at most π/√3."""
+        horizontal = _length(seen[0], seen[1])
+        squared = (horizontal - self.horizontal) ** 2 + (seen[2] - self.down) ** 2
+        wide = jnp.sqrt(self.spread**2 + squared / 2.0)
+        known = wide < UNKNOWN * horizontal
+        return jnp.where(known, wide / jnp.where(known, horizontal, 1.0), UNKNOWN)
+
+
+class Alignment(eqx.Module):
+    """An attitude found at rest.
+
+    **Fields**
+
+    - `q`: (4,) always of unit length. What is unknown of it is zero: the heading, or all three angles.
+    - `level`: whether roll and pitch are known; `heading`: whether the heading is.
+    - `field`: (3,) the magnetometer's reading in level axes, of which the first points to magnetic north if known.
+    """
+
+    q: Float[Array, "4"]
+    level: Bool[Array, ""]
+    heading: Bool[Array, ""]
+    field: Float[Array, "3"]
+
+    def deviations(self, tilt: float, heading: float) -> Float[Array, "3"]:
+        """Standard deviations of the attitude's error about north, east, down: those given, π/√3 where unknown."""
+        known = jnp.stack([self.level, self.level, self.heading])
+        return jnp.where(known, jnp.array([tilt, tilt, heading], self.q.dtype), UNKNOWN)
+
+
+def aligned(accelerometer: Float[Array, "3"], magnetometer: Float[Array, "3"]) -> Alignment:
+    """From mean readings, m/s² and any unit, body axes.
+
+    In free fall, or where a reading is not finite, nothing is known; without a field, or where it is vertical, all but
+    the heading is. Nose or tail up, roll is zero and the yaw is all of the turn. Heading is magnetic.
+    """
+    level = jnp.all(jnp.isfinite(accelerometer)) & (_norm(accelerometer) >= _LEAST_FORCE)
+    down = jnp.where(level, -accelerometer, jnp.array([0.0, 0.0, 1.0], accelerometer.dtype))
+    roll = _angle(down[2], down[1])
+    pitch = _angle(_length(down[1], down[2]), -down[0])
+    seen = jnp.where(jnp.all(jnp.isfinite(magnetometer)), magnetometer, 0.0)
+    field = matrix(from_euler(jnp.stack([roll, pitch, jnp.zeros_like(roll)]))) @ seen
+    horizontal = _length(field[0], field[1])
+    heading = level & (horizontal > _LEAST_SHARE * _norm(seen))
+    yaw = jnp.where(heading, -_angle(field[0], field[1]), 0.0)
+    north = jnp.stack([horizontal, jnp.zeros_like(horizontal), field[2]])
+    return Alignment(from_euler(jnp.stack([roll, pitch, yaw])), level, heading, jnp.where(heading, north, field))
+
+
+def _norm(v: Array) -> Array:
+    return _length(_length(v[0], v[1]), v[2])
+
+
+def _length(a: Array, b: Array) -> Array:
+    squared = a**2 + b**2
+    return jnp.where(squared > 0.0, jnp.sqrt(jnp.where(squared > 0.0, squared, 1.0)), 0.0)
+
+
+def _angle(real: Array, imaginary: Array) -> Array:
+    """atan2, zero and without a derivative at the origin."""
+    origin = (real == 0.0) & (imaginary == 0.0)
+    return jnp.where(origin, 0.0, jnp.arctan2(imaginary, jnp.where(origin, 1.0, real)))
