@@ -1,4 +1,4 @@
-"""`python -m experiments.fuzzy_filter --out DIR [--quick]`: the second paper's filter, its claims and its uses, measured.
+"""`python -m experiments.fuzzy_filter --out DIR [--quick]`: the second paper's filter, claims and uses, measured.
 
 Writes `results.json` and figures, among them such as the paper's 2 to 9. Parts that need real recordings say so and
 are left out where there are none.

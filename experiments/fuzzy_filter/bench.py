@@ -1,4 +1,4 @@
-"""The paper's bench in simulation: a board that is tilted once, with the gyros, accelerometers and GPS of its section 5.
+"""The paper's bench in simulation: a board that is tilted once, with its section 5's sensors.
 
 The paper names its sensors (ADXRS150, ADXL105, GPS at 1 Hz) but not the motion. A percentage error that starts at
 -100 % and comes up, as in its Figs 6 to 8, is that of a filter which stands level when the board does not; so the board
@@ -27,8 +27,8 @@ SPEED = 20.0
 FIX, ACCELEROMETER, NULL = 0.1, 0.02, 0.02
 # of a gyro sample with 40 Hz bandwidth, of its null, and of the wander of that, degrees and seconds
 RATE, BIAS, WANDER = 0.4 * DEGREE, 0.5 * DEGREE, 0.01 * DEGREE
-# what is known of the process: the angle's random walk, and twice the wander of the nulls, for a density that is too small
-# hurts more than one that is too large
+# what is known of the process: the angle's random walk, and twice the wander of the nulls, for a density that is too
+# small hurts more than one that is too large
 ATTITUDE_DENSITY, BIAS_DENSITY = RATE * math.sqrt(INTERVAL), 2.0 * WANDER
 
 
@@ -58,7 +58,8 @@ def bench(angle: Float[Array, ""], key: Key[Array, ""], seen: bool = False) -> B
     force = force + NULL * normal(3) + ACCELEROMETER * normal(SAMPLES, 3)
     fixes = jnp.stack([SPEED * times, 0.0 * times, 0.0 * times], axis=1) + FIX * normal(SAMPLES, 3)
     measured = constructed_over(times, force, fixes, jnp.arange(SAMPLES) % PER_FIX == 0)
-    scale = jax.vmap(lambda window: standard_deviations(*window, FIX, NULL))(measured.window)
+    of = lambda window: standard_deviations(window.fixes, window.times, window.accelerometer, FIX, NULL)
+    scale = jax.vmap(of)(measured.window)
     return Bench(times, angles, gyro, bias, measured, scale)
 
 

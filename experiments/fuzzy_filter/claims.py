@@ -10,8 +10,8 @@ import numpy as np
 
 from jaxsub.estimate import Rate
 
-from .pitch_runs import Runs
 from .bench import DEGREE, INTERVAL, TURN
+from .pitch_runs import Runs
 
 COMPARED = (14.1, 35.1, 44.6)  # the angles of Figs 6 to 8
 PerSeed = Mapping[tuple[float, str], Mapping[str, np.ndarray]]
@@ -50,7 +50,9 @@ def _smaller_deviates_more(per_seed: PerSeed) -> dict:
     share = {a: 100.0 * float(np.median(per_seed[a, "fuzzy"]["steady_rms_deg"])) / a for a in (29.1, 15.7, 3.05)}
     holds = share[3.05] > share[15.7] > share[29.1]
     degrees = {f"{a} in degrees": float(np.median(per_seed[a, "fuzzy"]["steady_rms_deg"])) for a in share}
-    return _claim("6.2 the smaller the angle, the larger the steady deviation in per cent", holds, share | degrees, "Fig. 5")
+    return _claim(
+        "6.2 the smaller the angle, the larger the steady deviation in per cent", holds, share | degrees, "Fig. 5"
+    )
 
 
 def _compared(per_seed: PerSeed, text: str, metric: str, ratio: float | None) -> dict:
@@ -79,7 +81,9 @@ def _steady(per_seed: PerSeed) -> dict:
         over = Rate(int(np.sum(per_seed[a, "random"]["steady_mean_deg"] > 0.0)), len(fuzzy))
         told[a] = {"share_worse": rate.share, "share_above": over.share, "random_deg": float(np.median(random))}
         holds &= rate.interval[0] > 0.5
-    return _claim("6.3 the steady-state error is higher with random noise, with a tendency to overshoot", holds, told, "Figs 6-8")
+    return _claim(
+        "6.3 the steady-state error is higher with random noise, with a tendency to overshoot", holds, told, "Figs 6-8"
+    )
 
 
 def _from_below(traces: Mapping[tuple[float, str], Runs]) -> dict:
@@ -106,4 +110,9 @@ def _oscillation(per_seed: PerSeed) -> dict:
 
 
 def _claim(text: str, holds: bool, figure: dict, paper: str) -> dict:
-    return {"claim": text, "holds": bool(holds), "in_the_paper": paper, "measured": {str(k): v for k, v in figure.items()}}
+    return {
+        "claim": text,
+        "holds": bool(holds),
+        "in_the_paper": paper,
+        "measured": {str(k): v for k, v in figure.items()},
+    }

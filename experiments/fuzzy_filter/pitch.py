@@ -22,11 +22,11 @@ from jaxsub.filter import (
 from jaxsub.navigation.attitude import PaperAttitude, RotationAttitude
 from jaxsub.navigation.rotation import from_euler
 
+from .bench import ATTITUDE_DENSITY, BIAS_DENSITY, DEGREE, INTERVAL, bench, filtered, pitch_of
 from .claims import COMPARED, examined
 from .consistency import consistency
 from .pitch_figures import draw
 from .pitch_runs import Runs, metrics
-from .bench import ATTITUDE_DENSITY, BIAS_DENSITY, DEGREE, INTERVAL, TURN, bench, filtered, pitch_of
 
 # degrees: the paper's Figs 2-4, 5, 6-8 and 9
 ANGLES = (4.4, 17.4, 28.2, 29.1, 15.7, 3.05, 14.1, 35.1, 44.6, 45.7)
@@ -66,9 +66,8 @@ def runs(process: AbstractProcess, rule: Callable[[Array], AbstractNoiseRule], s
         truth = jnp.concatenate([jax.vmap(from_euler)(run.angles), run.bias], axis=1)
         errors = jax.vmap(process.apart)(found.x, truth)
         measured, known = run.measured.angles[:, 1], run.measured.known[:, 1]
-        return Runs(
-            pitch_of(found), measured, known, nis, errors, found.x_std, found.noise_std, jnp.any(found.diverged)
-        )
+        told = (errors, found.x_std, found.noise_std, jnp.any(found.diverged))
+        return Runs._make((pitch_of(found), measured, known, nis, *told))
 
     keys = jax.random.split(jax.random.key(4), seeds)
     return jax.jit(lambda angle: jax.vmap(lambda key: once(angle, key))(keys))
@@ -82,7 +81,11 @@ def run(out: Path, quick: bool) -> dict:
     for name, rule in rules(process).items():
         _collect(traces, per_seed, name, runs(process, rule, seeds, seen=False))
     spread = np.sqrt(np.mean([traces[a, "fuzzy"].noise[:, 1:] ** 2 for a in ANGLES], axis=(0, 1, 2)) / INTERVAL)
-    for factor, name, angles in ((1.0, "random", ANGLES), (0.5, "random_half", COMPARED), (2.0, "random_double", COMPARED)):
+    for factor, name, angles in (
+        (1.0, "random", ANGLES),
+        (0.5, "random_half", COMPARED),
+        (2.0, "random_double", COMPARED),
+    ):
         rule = rules(process, factor * spread)["random"]
         _collect(traces, per_seed, name, runs(process, rule, seeds, seen=False), angles)
     table = {

@@ -7,8 +7,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from .pitch_runs import STEADY, Runs
 from .bench import DEGREE, INTERVAL, SAMPLES, TURN
+from .pitch_runs import STEADY, Runs
 
 _TIME = (np.arange(SAMPLES) - TURN) * INTERVAL
 _COLOURS = {"fuzzy": "#b5482a", "random": "#3b6ea5", "consistent": "#2f7d4f", "measured": "#9a9a9a"}

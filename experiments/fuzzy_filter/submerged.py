@@ -5,7 +5,6 @@ The same is asked of the normalised innovations squared (NIS) of a filter with c
 """
 
 import dataclasses
-import time
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
@@ -54,6 +53,7 @@ EFFECTS: dict[str, AbstractForce] = {
     "pitch moment": HullAsymmetry("pitch", number(300.0)),
 }
 _SHOWN = ("sway damping", "thrust loss", "heave force")
+_SIZES = {"whole": 1.0, "third": 1.0 / 3.0}
 _COPIES, _CLEAN_TESTS = 19, 8
 
 
@@ -97,37 +97,39 @@ def run(out: Path, quick: bool) -> dict:
     out.mkdir(parents=True, exist_ok=True)
     vehicle, count = nps_auv_ii(), 6 if quick else 20
     sigma = jnp.array([output.sigma for output in vehicle.layout.outputs])
-    start = at_rest(vehicle, count)
-    inputs = recorded(vehicle, {}, range(count))
-    detectors = {"fuzzy_q": noise_densities, "nis_constant": innovation_squares}
-    begin = time.perf_counter()
-    clean = {
+    inputs = recorded(vehicle, {}, count)
+    cases = {(name, size): {name: scale} for name in EFFECTS for size, scale in _SIZES.items()}
+    # one batch, so that one program is compiled
+    missing = joined([recorded(vehicle, sizes, count) for sizes in cases.values()])
+    results: dict = {"runs": count, "copies": _COPIES, "false_alarm": {}, "effects": {name: {} for name in EFFECTS}}
+    for detector, statistic in {"fuzzy_q": noise_densities, "nis_constant": innovation_squares}.items():
         # the last of the copies play the part of recordings
-        name: np.asarray(detector(vehicle, inputs, start, sigma, _COPIES + _CLEAN_TESTS)[0])
-        for name, detector in detectors.items()
-    }
-    results: dict = {"runs": count, "copies": _COPIES, "seconds": seconds(vehicle, inputs, start, sigma), "effects": {}}
-    results["false_alarm"] = {name: false_alarm(density) for name, density in clean.items()}
-    traces = {}
-    for name, effect in EFFECTS.items():
-        lines = {}
-        for size, scale in (("whole", 1.0), ("third", 1.0 / 3.0)):
-            runs = recorded(vehicle, {name: scale}, range(count))
-            seen = {d: np.asarray(detector(vehicle, runs, start, sigma, 0)[1]) for d, detector in detectors.items()}
-            judged = {d: against(clean[d][:_COPIES], density) for d, density in seen.items()}
-            lines[size] = {d: score(found, effect, vehicle.layout.equations) for d, found in judged.items()}
-            if size == "whole":
-                traces[name] = judged["fuzzy_q"]
-        results["effects"][name] = lines
-    results["seconds"]["all"] = time.perf_counter() - begin
-    draw(traces, clean["fuzzy_q"], vehicle.layout.equations, out / "submerged_process_noise.png")
+        clean = np.asarray(statistic(vehicle, inputs, at_rest(vehicle, count), sigma, _COPIES + _CLEAN_TESTS)[0])
+        every = np.asarray(statistic(vehicle, missing, at_rest(vehicle, len(missing.times)), sigma, 0)[1])
+        results["false_alarm"][detector] = false_alarm(clean)
+        found = {}
+        for case, part in zip(cases, np.split(every, len(cases)), strict=True):
+            name, size = case
+            found[case] = against(clean[:_COPIES], part)
+            judged = score(found[case], EFFECTS[name], vehicle.layout.equations)
+            results["effects"][name].setdefault(size, {})[detector] = judged
+        if detector == "fuzzy_q":
+            shown = {name: found[name, "whole"] for name in _SHOWN}
+            draw(shown, clean, vehicle.layout.equations, out / "submerged_process_noise.png")
     return results
 
 
-def recorded(vehicle: SubmergedBody, sizes: dict[str, float], seeds: range) -> Runs:
+def joined(parts: list[Runs]) -> Runs:
+    """Batches of runs of the same times as one batch."""
+    together = lambda *leaves: jnp.concatenate(leaves)
+    fields = ("times", "step_of", "live", "signals", "outputs", "mask")
+    return dataclasses.replace(parts[0], **{f: together(*(getattr(part, f) for part in parts)) for f in fields})
+
+
+def recorded(vehicle: SubmergedBody, sizes: dict[str, float], count: int) -> Runs:
     """What `vehicle` would have recorded with effects of so many times their size, a run a seed of inputs and noise."""
     layout = vehicle.layout
-    driven = [driving(vehicle, seed) for seed in seeds]
+    driven = [driving(vehicle, seed) for seed in range(count)]
     truth = dataclasses.replace(vehicle, layout=dataclasses.replace(layout, environment=(("acts", "acts"),)))
     for name, effect in EFFECTS.items():
         # every effect is there, at some size, so that one program simulates all
@@ -137,7 +139,7 @@ def recorded(vehicle: SubmergedBody, sizes: dict[str, float], seeds: range) -> R
     runs = stack(("acts",))
     shown = np.asarray(measure(truth, runs, sampled_states(truth, runs, at_rest(vehicle, len(driven)))))
     sigma = np.array([output.sigma for output in layout.outputs])
-    noise = np.stack([np.random.default_rng([7, seed]).normal(size=shown.shape[1:]) for seed in seeds])
+    noise = np.stack([np.random.default_rng([7, seed]).normal(size=shown.shape[1:]) for seed in range(count)])
     return dataclasses.replace(stack(()), outputs=jnp.asarray(shown + sigma * noise), mask=jnp.ones(shown.shape, bool))
 
 
@@ -171,16 +173,6 @@ def innovation_squares(
     every = lambda z: jax.vmap(follow)(start, samples(dataclasses.replace(runs, outputs=z)))
     squares = jax.vmap(every)(outputs)
     return squares[:-1], squares[-1]
-
-
-def seconds(vehicle: SubmergedBody, runs: Runs, start: Array, sigma: Array) -> dict[str, float]:
-    """What the signal of two runs adds to a diagnosis: the first time, which compiles, and any other."""
-    two, spent = runs.take((0, 1), 2), []
-    for _ in range(2):
-        begin = time.perf_counter()
-        jax.block_until_ready(noise_densities(vehicle, two, start[:2], sigma, _COPIES))
-        spent.append(time.perf_counter() - begin)
-    return {"first": spent[0], "next": spent[1]}
 
 
 def against(clean: np.ndarray, density: np.ndarray) -> Found:
@@ -238,7 +230,7 @@ def draw(traces: dict[str, Found], clean: np.ndarray, equations: tuple[str, ...]
             axes.set_yscale("log")
             axes.set_ylim(0.2, 60.0)
             if column == 0:
-                axes.set_ylabel(f"{equation}\n$Q_{{ii}}$ / clean")
+                axes.set_ylabel(f"{equation}\nfuzzy $Q_{{ii}}$ / clean")
         grid[0, column].set_title(f"{name} (in {EFFECTS[name].where[0]})")
         grid[-1, column].set_xlabel("time, s")
     figure.suptitle("Fuzzy process noise over that of clean runs: 5–95 % clean (blue) and with physics missing (red)")

@@ -89,16 +89,17 @@ class NoiseSignal:
 def noise_signals(fit: Fit, recordings: Sequence[Recording], copies: int = 19) -> list[NoiseSignal]:
     """The signal of each run of a fit, calibrated on clean `copies` of all runs, of which 19 are the fewest.
 
-    None where no filter can follow: a vehicle with an effect on an actuator, or a run on which the filter diverges.
+    None where no filter can follow: a vehicle with an effect on an actuator, a run on which the filter
+    diverges, or one too short for it to settle.
     """
     vehicle = fit.vehicle
     if any(isinstance(effect, AbstractActuator) for effect in vehicle.effects):
         return []
     densities = noise_densities(vehicle, fit.runs, fit.start, fit.sigma, copies)
     clean, recorded = (np.asarray(density) for density in densities)
-    if not (np.isfinite(clean).all() and np.isfinite(recorded).all()):
-        return []
     lengths = np.asarray(fit.runs.live).sum(1) + 1
+    if not (np.isfinite(clean).all() and np.isfinite(recorded).all() and lengths.min() > _SETTLED):
+        return []
     ratios, threshold = calibrated(clean, recorded, lengths)
     std = np.sqrt(recorded + np.asarray(floor(vehicle, fit.sigma)) ** 2)
     signals = []

@@ -9,8 +9,8 @@ when a jump of one state has been put down to another, such as a gyro's bias. He
 2. what the innovation's covariance S explains by itself is taken off: `widths` times $(MSM^T)_{ii}^{1/2}$;
 3. what is left enters eq. 18 with its fuzzy slope, and the state is widened by it before it is corrected;
 4. elsewhere the noise is λW, and λ follows the normalised innovation squared,
-   $\ln\lambda \leftarrow \ln\lambda + \gamma(\eta - E\eta)$ with $\eta = \min(\nu^TS^{-1}\nu/c,\ 3)$ of c channels, so that
-   one jump moves it little: it rests where innovations are as large as S says.
+   $\ln\lambda \leftarrow \ln\lambda + \gamma(\eta - E\eta)$ with $\eta = \min(\nu^TS^{-1}\nu/c,\ 3)$ of c channels, so
+   that one jump moves it little: it rests where innovations are as large as S says.
 """
 
 import equinox as eqx

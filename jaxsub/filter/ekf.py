@@ -27,7 +27,8 @@ class FilterState(eqx.Module):
 
     - `x`: (n,) state, of s ways to change. `theta`: (p,) parameters.
     - `joint`: what the filter's form keeps of the uncertainty of [x, θ]; `own`: of x were θ known, where it has that.
-    - `memory`, `residuals`: of the process-noise rule. `refused`: (c,) how often the gate refused a channel in a row.
+    - `memory`, `residuals`: of the process-noise rule.
+    - `outside`: (c,) how often each channel was outside the gate in a row.
     - `diverged`: whether a number ceased to be finite. The filter then stays at its last finite numbers.
     """
 
@@ -37,7 +38,7 @@ class FilterState(eqx.Module):
     own: Float[Array, "s s"] | None
     memory: Any
     residuals: Residuals
-    refused: Int[Array, " c"]
+    outside: Int[Array, " c"]
     diverged: Bool[Array, ""]
 
 
@@ -112,8 +113,8 @@ class AbstractFilter(eqx.Module):
         self, x: Float[Array, " n"], theta: Float[Array, " p"], joint: Float[Array, "q q"], diverged: Bool[Array, ""]
     ) -> FilterState:
         residuals = Residuals.none(self.x_root, self.R_root)
-        refused = jnp.zeros(len(self.R_root), int)
-        return _strong(FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, refused, diverged))
+        outside = jnp.zeros(len(self.R_root), int)
+        return _strong(FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, outside, diverged))
 
     def step(self, state: FilterState, sample: Sample) -> tuple[FilterState, Estimate]:
         """The next state and what is known after `sample`."""
@@ -122,9 +123,7 @@ class AbstractFilter(eqx.Module):
         G = jnp.where(moves, self.process.driven(state.x, state.theta, sample, root), 0.0)
         moved = dataclasses.replace(self.predict(state, sample, G), memory=memory)
         before = _select(moves, moved, state)
-        seen = self._look(before, sample)
-        refused = jnp.where(seen.mask, 0, before.refused + (sample.mask & ~seen.mask))
-        before = dataclasses.replace(before, refused=refused)
+        before, seen = self._look(before, sample)
         surprise = self.noise.surprise(before.memory, seen)
         if surprise is not None:
             memory, more = surprise
@@ -136,13 +135,13 @@ class AbstractFilter(eqx.Module):
         after = dataclasses.replace(_select(sound, after, state), diverged=~sound)
         s = len(self.x_root)
         deviations = self.form.deviations(after.joint)
-        residuals, factor = after.residuals, jnp.where(sound, factor, self.R_root)
+        innovation, factor = jnp.where(sound, seen.value, 0.0), jnp.where(sound, factor, self.R_root)
         noise_std = jnp.where(sound, jnp.linalg.norm(G, axis=1), 0.0)
-        parts = (after.x, after.theta, deviations[:s], deviations[s:], residuals.innovation, factor, residuals.mask)
+        parts = (after.x, after.theta, deviations[:s], deviations[s:], innovation, factor, seen.mask & sound)
         return after, Estimate(*parts, noise_std, after.diverged)
 
-    def _look(self, state: FilterState, sample: Sample) -> Innovation:
-        """What `sample` shows, what the gate refuses left out."""
+    def _look(self, state: FilterState, sample: Sample) -> tuple[FilterState, Innovation]:
+        """What `sample` shows, what the gate refuses left out, and what the gate has seen so far."""
         process = self.process
         ways = jnp.zeros(len(self.x_root), state.x.dtype)
         observe = lambda change, theta: process.observe(process.moved(state.x, change), theta, sample)
@@ -151,8 +150,11 @@ class AbstractFilter(eqx.Module):
         R_root = self.R_root if sample.scale is None else sample.scale[:, None] * self.R_root
         innovation = process.innovation(sample.outputs, expected)
         covariance = self.form.seen(state.joint, C) + R_root @ R_root.T
-        mask = sample.mask & self.gate(state.refused, innovation, jnp.sqrt(jnp.diag(covariance)))
-        return Innovation(jnp.where(mask, innovation, 0.0), mask, C, R_root, covariance)
+        inside = self.gate.inside(innovation, jnp.sqrt(jnp.diag(covariance)))
+        mask = sample.mask & (inside | (state.outside >= self.gate.patience))
+        outside = jnp.where(sample.mask, jnp.where(inside, 0, state.outside + 1), state.outside)
+        after = dataclasses.replace(state, outside=outside)
+        return after, Innovation(jnp.where(mask, innovation, 0.0), mask, C, R_root, covariance)
 
 
 def on_line(filter: AbstractFilter) -> Callable[[FilterState, Sample], tuple[FilterState, Estimate]]:

@@ -1,4 +1,4 @@
-"""Where a vehicle is and how it lies: attitude and position filters, constructed attitude, strapdown navigation, streams."""
+"""Where a vehicle is and how it lies: attitude, position and strapdown filters, and streams that flight loops call."""
 
 from .alignment import Alignment, MagneticField, aligned
 from .attitude import Gyro, PaperAttitude, RotationAttitude

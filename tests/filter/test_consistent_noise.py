@@ -1,4 +1,4 @@
-"""The consistent fuzzy rule finds how large the noise is, answers a jump at once, and leaves alone what is consistent."""
+"""The consistent fuzzy rule finds how large the noise is, answers a jump at once, and leaves the rest alone."""
 
 import jax
 import jax.numpy as jnp

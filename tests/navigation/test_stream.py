@@ -73,7 +73,7 @@ def altered(readings, index, **changes):
 
 
 def test_in_flight_and_off_line_say_the_same():
-    """To rounding: the compiler fuses multiplication and addition differently in a loop's body and by itself."""
+    """Here to the last bit; a compiler may fuse multiplication and addition differently in a loop and by itself."""
     readings = gentle_readings()
     stream = attitude_stream()
     state = started(stream, readings)
