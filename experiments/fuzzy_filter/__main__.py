@@ -5,6 +5,7 @@ are left out where there are none.
 """
 
 import importlib
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -15,13 +16,18 @@ _PARTS = ("regression", "pitch", "broad", "ansfl", "realtime", "throughput", "pr
 
 def part(name: str, out: Path, quick: bool) -> dict:
     """One part's results."""
-    return importlib.import_module(f".{name}", __package__).run(out, quick)
+    try:
+        module = importlib.import_module(f".{name}", __package__)
+    except ModuleNotFoundError as error:
+        print(f"skipped: no package {error.name}; pip install '.[peers]'", file=sys.stderr)
+        raise SystemExit(0) from None
+    return module.run(out, quick)
 
 
 def assembled(found: Mapping[str, dict]) -> dict:
     """The bench's comparison, its claims and its consistency at the top, and beside them the other parts by name."""
     others = {name: of for name, of in found.items() if name != "pitch"}
-    return {**found["pitch"], "latency": found["realtime"]["latency"], **others}
+    return {**found["pitch"], **others, "latency": found["realtime"]["latency"]}
 
 
 if __name__ == "__main__":

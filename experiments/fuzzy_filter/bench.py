@@ -58,7 +58,8 @@ def bench(angle: Float[Array, ""], key: Key[Array, ""], seen: bool = False) -> B
     force = force + NULL * normal(3) + ACCELEROMETER * normal(SAMPLES, 3)
     fixes = jnp.stack([SPEED * times, 0.0 * times, 0.0 * times], axis=1) + FIX * normal(SAMPLES, 3)
     measured = constructed_over(times, force, fixes, jnp.arange(SAMPLES) % PER_FIX == 0)
-    of = lambda window: standard_deviations(window.fixes, window.times, window.accelerometer, FIX, NULL)
+    stds = jnp.full(3, FIX), jnp.full(3, NULL)
+    of = lambda window: standard_deviations(window.fixes, window.times, window.accelerometer, *stds)
     scale = jax.vmap(of)(measured.window)
     return Bench(times, angles, gyro, bias, measured, scale)
 

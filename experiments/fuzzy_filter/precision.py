@@ -149,7 +149,7 @@ def _strapdown(run: Flight) -> Case:
     turned = Rotation.from_euler("ZYX", run.angles[:, ::-1])
     field = turned.inv().apply([0.4, 0.0, 0.9])
     outputs = np.concatenate([run.fixes, np.zeros((len(field), 4))], axis=1)
-    fixed = np.asarray(np.arange(len(field)) % _RATE == 0)
+    fixed = np.arange(len(field)) % _RATE == 0
     mask = fixed[:, None] & (np.arange(7) < 3) | (np.arange(7) == 6)
     inertial = Inertial(*map(jnp.asarray, (run.gyro, run.accelerometer, field)))
     x = np.concatenate([_LEVEL, [20.0, 0.0, 0.0], np.zeros(9)])
@@ -187,7 +187,7 @@ def _followed(case: Case, rule: str, form: AbstractForm, kind: DTypeLike) -> Tra
 
 def _least(kept: np.ndarray, root: bool) -> np.ndarray:
     """Of P scaled to a correlation; minus infinity where it is no matrix of numbers."""
-    sound = np.isfinite(kept).all(axis=(1, 2))
+    sound = np.asarray(np.isfinite(kept).all(axis=(1, 2)))
     kept = np.where(sound[:, None, None], kept, 0.0)
     size = np.linalg.norm(kept, axis=2) if root else np.sqrt(np.abs(np.diagonal(kept, axis1=1, axis2=2)))
     size = np.where(size > 0.0, size, 1.0)

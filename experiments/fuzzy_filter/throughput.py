@@ -17,8 +17,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from dynamax.nonlinear_gaussian_ssm import ParamsNLGSSM, extended_kalman_filter
-from filterpy.kalman import ExtendedKalmanFilter as Filterpy
+from dynamax.nonlinear_gaussian_ssm import ParamsNLGSSM, extended_kalman_filter  # pyright: ignore[reportMissingImports]
+from filterpy.kalman import ExtendedKalmanFilter as Filterpy  # pyright: ignore[reportMissingImports]
 from jax.experimental.compilation_cache import compilation_cache
 from jax.typing import DTypeLike
 
@@ -250,7 +250,7 @@ def _draw(path: Path, found: dict[str, dict], filterpy: float, batches: tuple[in
         axis.axhline(20.0 * filterpy, color="0.4", ls=":", label="20 times that")
         axis.set(xscale="log", yscale="log", xlabel="filters in the batch", title=bits)
     axes[0].set_ylabel("steps a second")
-    axes[1].legend(frameon=False, fontsize=9, loc="lower right")
+    axes[1].legend(frameon=False, fontsize=9, loc="center right")
     figure.savefig(path, dpi=120)
     plt.close(figure)
 
