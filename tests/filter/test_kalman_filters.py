@@ -202,8 +202,9 @@ def test_the_modified_filter_in_float32_survives_where_covariances_do_not():
         run(Covariance(), jnp.float32),
     )
     assert low.joint.dtype == low.theta.dtype == jnp.float32
-    assert np.linalg.norm(low.theta - high.theta) < 1e-6 * np.linalg.norm(high.theta)
-    np.testing.assert_allclose(seen.theta_std[0, -1], reference.theta_std[0, -1], rtol=1e-6)
+    # some forty roundings of float32 in two hundred updates; most draws stay within ten
+    assert np.linalg.norm(low.theta - high.theta) < 5e-6 * np.linalg.norm(high.theta)
+    np.testing.assert_allclose(seen.theta_std[0, -1], reference.theta_std[0, -1], rtol=5e-6)
     assert np.linalg.svd(np.asarray(low.joint, float))[1].min() > 0.0
     assert not bool(low.diverged)
     covariance = np.asarray(plain.joint, float)
