@@ -8,7 +8,7 @@ from .fuzzy import FuzzyNoise
 from .gate import AbstractGate, InnovationGate, Open
 from .late import DelayedFilter, Late, Past
 from .mekf import ModifiedKalmanFilter
-from .model import AbstractProcess, Sample, linearised
+from .model import AbstractProcess, Sample, linearised, select
 from .noise import AbstractNoiseRule, ConstantNoise, Innovation, Residuals
 from .passes import Identified, identify, over_runs
 from .regression import FuzzyLine, fuzzy_line
@@ -51,6 +51,7 @@ __all__ = [
     "on_line",
     "over_runs",
     "samples",
+    "select",
     "state_scale",
     "vehicle_filter",
 ]

@@ -14,14 +14,13 @@ when a jump of one state has been put down to another, such as a gyro's bias. He
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import cho_factor, cho_solve
 from jax.scipy.special import gammainc
 from jaxtyping import Array, Float
 
+from .fuzzy import slopes
 from .noise import AbstractNoiseRule, Innovation, Residuals
-from .regression import fuzzy_line
 from .rules import Window
 
 # ε: so little of S that it matters only for channels that no disturbance moves
@@ -79,8 +78,7 @@ class ConsistentFuzzyNoise(AbstractNoiseRule):
         beyond = self._beyond(seen, S)
         since = memory.window.now - jnp.max(memory.window.times)
         window = memory.window.with_newest(beyond, fresh)
-        line = jax.vmap(fuzzy_line, in_axes=(None, 1, None, None))(window.times, window.values, window.held, self.level)
-        jump = jnp.where(fresh, jnp.abs(beyond * line.centre[:, 1]) * since, 0.0)
+        jump = jnp.where(fresh, jnp.abs(beyond * slopes(window, self.level)) * since, 0.0)
         squared, count = seen.value @ cho_solve(cho_factor(S), seen.value), jnp.maximum(jnp.sum(seen.mask), 1)
         surplus = jnp.minimum(squared / count, _MOST_NIS) - _expected(count.astype(squared.dtype))
         moved = memory.log_scale + jnp.where(fresh, self.speed * surplus, 0.0)

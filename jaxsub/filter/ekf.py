@@ -16,7 +16,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .form import AbstractForm, SquareRoot
 from .gate import AbstractGate, Open
-from .model import AbstractProcess, Sample, linearised
+from .model import AbstractProcess, Sample, linearised, select
 from .noise import AbstractNoiseRule, Innovation, Residuals
 
 
@@ -122,7 +122,7 @@ class AbstractFilter(eqx.Module):
         moves = sample.elapsed > 0.0
         G = jnp.where(moves, self.process.driven(state.x, state.theta, sample, root), 0.0)
         moved = dataclasses.replace(self.predict(state, sample, G), memory=memory)
-        before = _select(moves, moved, state)
+        before = select(moves, moved, state)
         before, seen = self._look(before, sample)
         surprise = self.noise.surprise(before.memory, seen)
         if surprise is not None:
@@ -132,7 +132,7 @@ class AbstractFilter(eqx.Module):
         after, factor = self.correct(before, seen)
         finite = jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(after)])
         sound = jnp.all(finite) & ~state.diverged
-        after = dataclasses.replace(_select(sound, after, state), diverged=~sound)
+        after = dataclasses.replace(select(sound, after, state), diverged=~sound)
         s = len(self.x_root)
         deviations = self.form.deviations(after.joint)
         innovation, factor = jnp.where(sound, seen.value, 0.0), jnp.where(sound, factor, self.R_root)
@@ -227,7 +227,3 @@ def _of_state(G: Float[Array, "s m"], p: int) -> Float[Array, "q m"]:
 def _strong(state: FilterState) -> FilterState:
     """`state` without the weak type of Python numbers, with which a step would be compiled for twice."""
     return jax.tree.map(lambda leaf: jnp.asarray(leaf, leaf.dtype), state)
-
-
-def _select(which: Bool[Array, ""], one: FilterState, other: FilterState) -> FilterState:
-    return jax.tree.map(lambda a, b: jnp.where(which, a, b), one, other)

@@ -42,7 +42,12 @@ class FuzzyNoise(AbstractNoiseRule):
         window, density = memory
         fresh = jnp.any(residuals.mask)
         window = window.with_newest(residuals.correction, fresh)
-        line = jax.vmap(fuzzy_line, in_axes=(None, 1, None, None))(window.times, window.values, window.held, self.level)
-        steep = jnp.abs(residuals.correction * line.centre[:, 1])
+        steep = jnp.abs(residuals.correction * slopes(window, self.level))
         density = jnp.where(fresh, jnp.clip(steep, self.least**2, self.most**2), density)
         return (window.on(elapsed), density), jnp.diag(jnp.sqrt(density) * jnp.sqrt(elapsed))
+
+
+def slopes(window: Window, level: float) -> Float[Array, " k"]:
+    """(k,) the centre of each fuzzy line's slope over the window, per second."""
+    lines = jax.vmap(fuzzy_line, in_axes=(None, 1, None, None))(window.times, window.values, window.held, level)
+    return lines.centre[:, 1]

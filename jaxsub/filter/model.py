@@ -64,6 +64,11 @@ class AbstractProcess(eqx.Module):
         return measured - expected
 
 
+def select(which: Bool[Array, ""], one: PyTree[Array], other: PyTree[Array]) -> PyTree[Array]:
+    """All of `one` or all of `other`."""
+    return jax.tree.map(lambda a, b: jnp.where(which, a, b), one, other)
+
+
 def linearised(
     f: Callable[[Array, Array], Array], change: Float[Array, " s"], theta: Float[Array, " p"]
 ) -> tuple[Float[Array, " m"], Float[Array, "m s"], Float[Array, "m p"]]:

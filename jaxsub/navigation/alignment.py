@@ -4,16 +4,12 @@ The accelerometers show the vertical, $d = -f/|f|$ in body axes, and with it rol
 heading. Source: Titterton and Weston (2004), §10.
 """
 
-import math
-
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from .rotation import from_euler, matrix
+from .rotation import UNKNOWN, angle, from_euler, length, matrix
 
-# the standard deviation of an angle that may be anything
-UNKNOWN = math.pi / math.sqrt(3.0)
 # m/s² below which a specific force has no direction
 _LEAST_FORCE = 1.0
 # the share of the field that must be horizontal; with less of it, dip above 87°, a small disturbance turns it anywhere
@@ -38,7 +34,7 @@ class MagneticField(eqx.Module):
 
     def heading_std(self, seen: Float[Array, "3"]) -> Float[Array, ""]:
         r"""$\sqrt{\sigma^2 + d^2/2}$ over the horizontal part of the field `seen`, north, east, down; at most π/√3."""
-        horizontal = _length(seen[0], seen[1])
+        horizontal = length(seen[0], seen[1])
         squared = (horizontal - self.horizontal) ** 2 + (seen[2] - self.down) ** 2
         wide = jnp.sqrt(self.spread**2 + squared / 2.0)
         known = wide < UNKNOWN * horizontal
@@ -74,27 +70,16 @@ def aligned(accelerometer: Float[Array, "3"], magnetometer: Float[Array, "3"]) -
     """
     level = jnp.all(jnp.isfinite(accelerometer)) & (_norm(accelerometer) >= _LEAST_FORCE)
     down = jnp.where(level, -accelerometer, jnp.array([0.0, 0.0, 1.0], accelerometer.dtype))
-    roll = _angle(down[2], down[1])
-    pitch = _angle(_length(down[1], down[2]), -down[0])
+    roll = angle(down[2], down[1])
+    pitch = angle(length(down[1], down[2]), -down[0])
     seen = jnp.where(jnp.all(jnp.isfinite(magnetometer)), magnetometer, 0.0)
     field = matrix(from_euler(jnp.stack([roll, pitch, jnp.zeros_like(roll)]))) @ seen
-    horizontal = _length(field[0], field[1])
+    horizontal = length(field[0], field[1])
     heading = level & (horizontal > _LEAST_SHARE * _norm(seen))
-    yaw = jnp.where(heading, -_angle(field[0], field[1]), 0.0)
+    yaw = jnp.where(heading, -angle(field[0], field[1]), 0.0)
     north = jnp.stack([horizontal, jnp.zeros_like(horizontal), field[2]])
     return Alignment(from_euler(jnp.stack([roll, pitch, yaw])), level, heading, jnp.where(heading, north, field))
 
 
 def _norm(v: Array) -> Array:
-    return _length(_length(v[0], v[1]), v[2])
-
-
-def _length(a: Array, b: Array) -> Array:
-    squared = a**2 + b**2
-    return jnp.where(squared > 0.0, jnp.sqrt(jnp.where(squared > 0.0, squared, 1.0)), 0.0)
-
-
-def _angle(real: Array, imaginary: Array) -> Array:
-    """atan2, zero and without a derivative at the origin."""
-    origin = (real == 0.0) & (imaginary == 0.0)
-    return jnp.where(origin, 0.0, jnp.arctan2(imaginary, jnp.where(origin, 1.0, real)))
+    return length(length(v[0], v[1]), v[2])

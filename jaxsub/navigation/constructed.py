@@ -14,7 +14,6 @@ Position, velocity and acceleration are in the navigation frame, north, east, do
 """
 
 import dataclasses
-import math
 from typing import NamedTuple
 
 import equinox as eqx
@@ -24,12 +23,11 @@ from jax.typing import DTypeLike
 from jaxtyping import Array, Bool, Float, Int
 
 from ..effects import GRAVITY
-from .rotation import wrapped
+from ..filter import select
+from .rotation import UNKNOWN, angle, length, wrapped
 
 # the share of the window in which the accelerometer must have been heard
 _COVERED = 0.5
-# the standard deviation of an angle that may be anything
-_UNKNOWN = math.pi / math.sqrt(3.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,7 +103,7 @@ def constructed_attitude(
     course, has_heading = _course(velocity, heading, limits)
     # without a heading the direction of a horizontal acceleration in the body cannot be told
     sideways = jnp.where(has_heading, across[:2], 0.0)
-    has_level = sound & (has_heading | (_length(*across[:2]) < limits.force))
+    has_level = sound & (has_heading | (length(*across[:2]) < limits.force))
     ahead = jnp.cos(course) * sideways[0] + jnp.sin(course) * sideways[1]
     abeam = jnp.cos(course) * sideways[1] - jnp.sin(course) * sideways[0]
     below = across[2] - GRAVITY
@@ -141,8 +139,8 @@ def standard_deviations(
     spread = (J[0] * position_std).reshape(3, -1), J[1] * accelerometer_std, (J[2] * heading_std)[:, None]
     variance = jnp.sum(jnp.concatenate(spread, axis=1) ** 2, axis=1)
     # the comparison is false for a variance that overflowed to NaN
-    bounded = known & (variance < _UNKNOWN**2)
-    return jnp.where(bounded, jnp.sqrt(jnp.where(bounded, variance, 1.0)), _UNKNOWN)
+    bounded = known & (variance < UNKNOWN**2)
+    return jnp.where(bounded, jnp.sqrt(jnp.where(bounded, variance, 1.0)), UNKNOWN)
 
 
 class ConstructedAttitudeStream(eqx.Module):
@@ -196,11 +194,11 @@ class ConstructedAttitudeStream(eqx.Module):
         time = jnp.where(timed, time, self.time)
         back = self.started & (time < self.time)
         fresh = ConstructedAttitudeStream.start(self.limits, self.time.dtype)
-        heard = jax.tree.map(lambda a, b: jnp.where(back, a, b), fresh, self)._hear(time, accelerometer)
+        heard = select(back, fresh, self)._hear(time, accelerometer)
         arrives = timed & present & jnp.all(jnp.isfinite(fix)) & ((heard.count == 0) | (time > heard.times[1]))
-        after = jax.tree.map(lambda a, b: jnp.where(arrives, a, b), heard._receive(time, fix), heard)
+        after = select(arrives, heard._receive(time, fix), heard)
         found = heard._construct(time, fix, arrives & (heard.count == 2), heading)
-        return jax.tree.map(lambda a, b: jnp.where(timed, a, b), after, self), found
+        return select(timed, after, self), found
 
     def _hear(self, time: Array, accelerometer: Array) -> "ConstructedAttitudeStream":
         sound = jnp.all(jnp.isfinite(accelerometer))
@@ -271,8 +269,8 @@ def _motion(window: Window, limits: Limits) -> tuple[Array, Array, Array, Array]
 
 
 def _course(velocity: Array, heading: Array | None, limits: Limits) -> tuple[Array, Array]:
-    moving = _length(velocity[0], velocity[1]) >= limits.speed
-    track = _angle(velocity[0], velocity[1])
+    moving = length(velocity[0], velocity[1]) >= limits.speed
+    track = angle(velocity[0], velocity[1])
     if heading is None:
         return track, moving
     given = jnp.isfinite(heading)
@@ -280,29 +278,18 @@ def _course(velocity: Array, heading: Array | None, limits: Limits) -> tuple[Arr
 
 
 def _pitch(ahead: Array, below: Array, force: Array, limits: Limits) -> tuple[Array, Array]:
-    r = _length(ahead, below)
+    r = length(ahead, below)
     ratio = force / jnp.where(r > 0.0, r, 1.0)
     inside = jnp.abs(ratio) < 1.0
     cosine = jnp.where(inside, ratio, jnp.sign(ratio))
     sine = jnp.where(inside, jnp.sqrt(jnp.where(inside, 1.0 - cosine**2, 1.0)), 0.0)
     # falling faster than gravity pulls turns the apparent vertical over, and with it the branch of the smaller pitch
     sense = jnp.where(below > 0.0, -1.0, 1.0)
-    pitch = wrapped(-_angle(ahead, below) - sense * jnp.arctan2(sine, cosine))
+    pitch = wrapped(-angle(ahead, below) - sense * jnp.arctan2(sine, cosine))
     steepest = jnp.pi / 2.0
     return jnp.clip(pitch, -steepest, steepest), inside & (r >= limits.force) & (jnp.abs(pitch) <= steepest)
 
 
 def _roll(abeam: Array, below: Array, forces: Array, limits: Limits) -> tuple[Array, Array]:
-    known = jnp.minimum(_length(abeam, below), _length(forces[1], forces[2])) >= limits.force
-    return wrapped(_angle(abeam, below) - _angle(forces[1], forces[2])), known
-
-
-def _length(a: Array, b: Array) -> Array:
-    squared = a**2 + b**2
-    return jnp.where(squared > 0.0, jnp.sqrt(jnp.where(squared > 0.0, squared, 1.0)), 0.0)
-
-
-def _angle(real: Array, imaginary: Array) -> Array:
-    """atan2, zero and without a derivative at the origin."""
-    origin = (real == 0.0) & (imaginary == 0.0)
-    return jnp.where(origin, 0.0, jnp.arctan2(imaginary, jnp.where(origin, 1.0, real)))
+    known = jnp.minimum(length(abeam, below), length(forces[1], forces[2])) >= limits.force
+    return wrapped(angle(abeam, below) - angle(forces[1], forces[2])), known

@@ -5,10 +5,14 @@ $R = R_z(\psi)R_y(\theta)R_x(\phi)$. Every function has finite values and deriva
 Source: Titterton and Weston (2004), §3; the angles' half-sums as in Bernardes and Viollet (2022), PLoS ONE 17.
 """
 
+import math
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+# the standard deviation of an angle that may be anything
+UNKNOWN = math.pi / math.sqrt(3.0)
 # below it, squared, the series of sine and arctangent that are used here are exact in 64 bits
 _SMALL = 1e-4
 
@@ -112,6 +116,18 @@ def from_euler(angles: Float[Array, "3"]) -> Float[Array, "4"]:
 def wrapped(angle: Float[Array, "*k"]) -> Float[Array, "*k"]:
     """The angle less whole turns, in (-π, π]."""
     return angle - 2.0 * jnp.pi * jnp.ceil(angle / (2.0 * jnp.pi) - 0.5)
+
+
+def length(a: Float[Array, ""], b: Float[Array, ""]) -> Float[Array, ""]:
+    """Of [a, b]; zero, without a derivative, where both are zero."""
+    squared = a**2 + b**2
+    return jnp.where(squared > 0.0, jnp.sqrt(jnp.where(squared > 0.0, squared, 1.0)), 0.0)
+
+
+def angle(real: Float[Array, ""], imaginary: Float[Array, ""]) -> Float[Array, ""]:
+    """Of a complex number, rad; zero, without a derivative, at the origin."""
+    origin = (real == 0.0) & (imaginary == 0.0)
+    return jnp.where(origin, 0.0, jnp.arctan2(imaginary, jnp.where(origin, 1.0, real)))
 
 
 def _polar(real: Float[Array, ""], imaginary: Float[Array, ""]) -> tuple[Float[Array, ""], Float[Array, ""]]:

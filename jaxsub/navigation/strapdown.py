@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 from ..effects import GRAVITY
 from ..filter import AbstractProcess, Sample
 from .alignment import MagneticField
-from .rotation import conjugate, exponential, logarithm, matrix, normalised, product
+from .rotation import angle, conjugate, exponential, logarithm, matrix, normalised, product
 
 _Number = Float[Array, ""] | float
 
@@ -115,6 +115,5 @@ class StrapdownNavigation(AbstractProcess):
         held = jax.lax.stop_gradient(R)
         seen = held @ sample.inputs.magnetometer
         north, east, _ = R @ (held.T @ (seen * jnp.array([1.0, 1.0, 0.0], x.dtype)))
-        vertical = (north == 0.0) & (east == 0.0)
-        heading = -jnp.arctan2(jnp.where(vertical, 0.0, east), jnp.where(vertical, 1.0, north))
+        heading = -angle(north, east)
         return jnp.concatenate([x[7:10], x[4:7], (heading / self.field.heading_std(seen))[None]])

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from ..errors import InputError
-from ..filter import AbstractFilter, Estimate, FilterState, Sample
+from ..filter import AbstractFilter, Estimate, FilterState, Sample, select
 
 
 class Reading(eqx.Module):
@@ -194,9 +194,9 @@ class Stream(AbstractStream):
             broken=broken,
         )
         after = StreamState(
-            _select(idle, state.filter, moved),
-            _select(passed, waiting, clock),
-            _select(passed, state.inputs, inputs),
+            select(idle, state.filter, moved),
+            select(passed, waiting, clock),
+            select(passed, state.inputs, inputs),
             jnp.where(passed, state.taken, (state.taken & tick.duplicate) | mask),
             faults,
         )
@@ -245,7 +245,3 @@ def _sound(reading: Reading) -> Bool[Array, " c"]:
     if reading.scale is None:
         return finite
     return finite & jnp.isfinite(reading.scale) & (reading.scale > 0.0)
-
-
-def _select(which: Bool[Array, ""], one: Any, other: Any) -> Any:
-    return jax.tree.map(lambda a, b: jnp.where(which, a, b), one, other)

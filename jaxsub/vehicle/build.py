@@ -5,7 +5,7 @@ import re
 
 import jax.numpy as jnp
 
-from ..effects import EQUATIONS, AbstractEffect
+from ..effects import EQUATIONS, GRAVITY, AbstractEffect
 from ..errors import InputError
 from ..parameters import Parameter, number
 from .base import Layout, Output
@@ -84,7 +84,7 @@ def _complete(values: dict, where: str) -> dict:
             raise InputError(f"{where}: body.{key}", f"is {float(values[key]):g}", "give a positive number")
     if "mass" not in values:
         raise InputError(f"{where}: body.mass", "is missing", "add mass = … in kg")
-    weight = values.get("weight", values["mass"] * 9.80665)
+    weight = values.get("weight", values["mass"] * GRAVITY)
     filled = {"weight": weight, "buoyancy": weight, "speed": jnp.zeros(())}
     filled |= dict.fromkeys(("x_B", "y_B", "z_B"), jnp.zeros(()))
     # a locked rotation needs no inertia; any positive number keeps the 6 × 6 matrix regular

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from ..effects import Motion, Signal
+from ..effects import GRAVITY, Motion, Signal
 
 
 def position_rates(motion: Motion) -> dict[str, Signal]:
@@ -46,5 +46,5 @@ def specific_force(
     lever = jnp.asarray(arm)
     centripetal = jnp.cross(angular, jnp.cross(angular, jnp.broadcast_to(lever, angular.shape)))
     tangential = jnp.cross(angular_rate, jnp.broadcast_to(lever, angular.shape))
-    total = linear_rate + jnp.cross(angular, linear) + tangential + centripetal - 9.80665 * down
+    total = linear_rate + jnp.cross(angular, linear) + tangential + centripetal - GRAVITY * down
     return {"ax": total[..., 0], "ay": total[..., 1], "az": total[..., 2]}
