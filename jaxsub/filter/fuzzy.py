@@ -47,7 +47,7 @@ class FuzzyNoise(AbstractNoiseRule):
         return (window.on(elapsed), density), jnp.diag(jnp.sqrt(density) * jnp.sqrt(elapsed))
 
 
-def slopes(window: Window, level: float) -> Float[Array, " k"]:
+def slopes(window: Window, level: Float[Array, ""] | float) -> Float[Array, " k"]:
     """(k,) the centre of each fuzzy line's slope over the window, per second."""
     lines = jax.vmap(fuzzy_line, in_axes=(None, 1, None, None))(window.times, window.values, window.held, level)
     return lines.centre[:, 1]
