@@ -7,24 +7,22 @@ come, 24 ms; that is the budget of a cycle: decode, construct an attitude, step 
 import gc
 import os
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from jax.flatten_util import ravel_pytree
 from scipy.spatial.transform import Rotation
 
 from jaxsub.effects import GRAVITY
 from jaxsub.filter import AbstractNoiseRule, ConsistentFuzzyNoise, ExtendedKalmanFilter, FuzzyNoise
 from jaxsub.navigation import link
+from jaxsub.navigation.ahead import Packed, Program, ahead_of_time
 from jaxsub.navigation.attitude import Gyro, RotationAttitude
 from jaxsub.navigation.constructed import ConstructedAttitudeStream
 from jaxsub.navigation.stream import Reading, Stream
@@ -42,6 +40,7 @@ _FAULTS = {"jitter": 0.01, "corruption": 0.001, "dropout": 0.05}
 _PARTS = ("decode", "construct", "filter", "cycle")
 _WARM = 100
 _UNRESTED = 1000
+_NOWHERE = np.zeros(3)
 
 
 class Flight(NamedTuple):
@@ -90,41 +89,14 @@ def arrivals(run: Flight, line: link.Line) -> list[bytes]:
 
 
 @dataclass
-class Program:
-    """A step `(state, seen) -> state, found` compiled ahead of time with all arrays of each in one.
-
-    A call costs the host about a microsecond for every array that goes in or comes out, which for a filter's state and
-    estimate would be a third of the whole.
-    """
-
-    state: Any
-    compiled: Callable[[Any, Any], tuple[Any, Any]]
-    compile_s: float
-
-    @classmethod
-    def of(cls, step: Callable[[Any, Any], tuple[Any, Any]], state: Any, like: Any) -> "Program":
-        flat, whole = ravel_pytree(state)
-        seen, reading = ravel_pytree(like)
-
-        def packed(state: jax.Array, seen: jax.Array) -> tuple[jax.Array, jax.Array]:
-            after, found = step(whole(state), reading(seen))
-            return ravel_pytree(after)[0], ravel_pytree(found)[0]
-
-        begin = time.perf_counter()
-        compiled = jax.jit(packed).lower(flat, seen).compile()
-        return cls(flat, compiled, time.perf_counter() - begin)
-
-    def step(self, seen: np.ndarray) -> np.ndarray:
-        self.state, found = self.compiled(self.state, seen)
-        return np.asarray(found)
-
-
-@dataclass
 class Loop:
     """The host's loop; `track` is time and quaternion after each frame, `spent` s in each of `_PARTS`."""
 
     construct: Program
     filter: Program
+    constructing: Packed
+    filtering: Packed
+    compile_s: float
     decoder: link.Decoder = field(default_factory=link.Decoder)
     track: list[np.ndarray] = field(default_factory=list)
     spent: list[tuple[float, ...]] = field(default_factory=list)
@@ -138,16 +110,16 @@ class Loop:
         constructing = filtering = 0.0
         for reading in readings:
             first = now()
-            fix, present = (np.zeros(3), 0.0) if reading.fix is None else (reading.fix, 1.0)
-            seen = np.concatenate([[reading.time], reading.accelerometer, fix, [present]])
-            found = self.construct.step(seen)
+            fix, present = (_NOWHERE, False) if reading.fix is None else (reading.fix, True)
+            shown = (reading.time, reading.accelerometer, fix, present, reading.gyro)
+            given: Any = tuple(map(np.asarray, shown))
+            self.constructing, found = self.construct.step(self.constructing, given[:4])
             second = now()
-            # the angles, and after them which are known, stand first in what was constructed
-            seen = np.concatenate([[reading.time], reading.gyro, found[:6]])
-            estimate = self.filter.step(seen)
+            seen = Reading(given[0], Gyro(given[4]), found.angles, found.known)
+            self.filtering, estimate = self.filter.step(self.filtering, seen)
             third = now()
             constructing, filtering = constructing + second - first, filtering + third - second
-            self.track.append(np.concatenate([[reading.time], estimate[:4]]))
+            self.track.append(np.concatenate([[reading.time], estimate.x[:4]]))
         self.spent.append((decoded, constructing, filtering, now() - begin))
 
 
@@ -158,12 +130,14 @@ def loop(rule: AbstractNoiseRule) -> Loop:
     stream, zeros = Stream(filter), jnp.zeros(3)
     reading = Reading(jnp.zeros(()), Gyro(zeros), zeros, jnp.zeros(3, bool))
     begun = filter.start(jnp.array([1.0, *[0.0] * 6]), jnp.zeros(0), jnp.zeros((0, 0)))
-    construct = Program.of(
-        lambda state, seen: state.step(*seen),
-        ConstructedAttitudeStream.start(),
-        (jnp.zeros(()), zeros, zeros, jnp.zeros((), bool)),
-    )
-    return Loop(construct, Program.of(stream.step, stream.start(begun, reading), reading))
+    level = ConstructedAttitudeStream.start()
+    like = (jnp.zeros(()), zeros, zeros, jnp.zeros((), bool))
+    construct = Program(lambda state, seen: state.step(*seen), level, like)
+    still = stream.start(begun, reading)
+    begin = time.perf_counter()
+    program = ahead_of_time(stream, still, reading)
+    taken = time.perf_counter() - begin
+    return Loop(construct, program, construct.pack(level), program.pack(still), taken)
 
 
 def _rules() -> dict[str, AbstractNoiseRule]:
@@ -247,7 +221,7 @@ def run(out: Path, quick: bool) -> dict:
             assert flown is not None
             rows, key = np.array(flown.spent), f"{rule_name}, {name} link"
             spent[key] = rows
-            latency[key] = {**_latency(rows), "filter_p99_of_runs": p99, "compile_s": flown.filter.compile_s}
+            latency[key] = {**_latency(rows), "filter_p99_of_runs": p99, "compile_s": flown.compile_s}
             missed[key] = int(np.sum(rows[_WARM:, 3] > _BUDGET))
             attitude[key] = _error(np.array(flown.track), whole)
             decoder = flown.decoder

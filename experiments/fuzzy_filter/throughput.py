@@ -255,6 +255,35 @@ def _draw(path: Path, found: dict[str, dict], filterpy: float, batches: tuple[in
     plt.close(figure)
 
 
+def _best(call: Callable[[], Any], repeats: int = 9) -> float:
+    """s of the fastest of so many calls."""
+    taken = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        call()
+        taken.append(time.perf_counter() - begin)
+    return min(taken)
+
+
+def _floor(n: int = 7, c: int = 3) -> dict[str, float]:
+    """What a step of the square-root filter must at least take, from this machine's rates in 64 bits.
+
+    Flops: 2n³ for FJ; 4(n - k)(2n - k) for each reflection k of [FJ, G]; 2cn² for CJ; 4(n + c - k)(n + 1) for each of
+    the update's; c²n + 2cn for gain and correction. Jacobians are not counted. Bytes: rates and angles in, state and
+    covariance out, once each; what is carried stays in the cache. Rates: of a large product of matrices, and of a copy.
+    """
+    flops = 2 * n**3 + sum(4 * (n - k) * (2 * n - k) for k in range(n)) + 2 * c * n**2
+    flops += sum(4 * (n + c - k) * (n + 1) for k in range(c)) + c**2 * n + 2 * c * n
+    moved = 8 * (3 + c + n + n**2)
+    square, long = np.ones((1000, 1000)), np.ones(10_000_000)
+    other = np.empty_like(long)
+    flops_per_s = 2.0 * len(square) ** 3 / _best(lambda: square @ square)
+    bytes_per_s = 2.0 * long.nbytes / _best(lambda: np.copyto(other, long))
+    seconds = {"arithmetic_s": flops / flops_per_s, "memory_s": moved / bytes_per_s}
+    rates = {"flops_per_s": flops_per_s, "bytes_per_s": bytes_per_s}
+    return {"flops": flops, "bytes": moved, **rates, **seconds, "step_s": max(seconds.values())}
+
+
 def run(out: Path, quick: bool) -> dict:
     """Compare the three, time them and draw; the numbers."""
     rng = np.random.default_rng(1960)
@@ -280,6 +309,7 @@ def run(out: Path, quick: bool) -> dict:
         ours = {key.removeprefix(name): row["median"] for key, row in found.items() if key.startswith(f"{name} float")}
         return {key.strip(): rate / found[other + key]["median"] for key, rate in ours.items()}
 
+    floor = _floor()
     best = max(row["median"] for key, row in found.items() if key.startswith("square root float64"))
     return {
         "states": 7,
@@ -294,5 +324,6 @@ def run(out: Path, quick: bool) -> dict:
             "all_that_a_call_gives": times("square root, whole", "dynamax, whole"),
             "covariance_form": times("covariance", "dynamax"),
         },
+        "floor": {**floor, "share_reached": best * floor["step_s"]},
         "load": os.getloadavg()[0],
     }

@@ -15,13 +15,14 @@ when a jump of one state has been put down to another, such as a gyro's bias. He
 
 import equinox as eqx
 import jax.numpy as jnp
-from jax.scipy.linalg import cho_factor, cho_solve
-from jax.scipy.special import gammainc
+import numpy as np
 from jaxtyping import Array, Float
+from scipy.special import gammainc
 
 from .fuzzy import slopes
 from .noise import AbstractNoiseRule, Innovation, Residuals
 from .rules import Window
+from .small import backward, cholesky, forward, times
 
 # ε: so little of S that it matters only for channels that no disturbance moves
 _REST = 1e-6
@@ -79,8 +80,9 @@ class ConsistentFuzzyNoise(AbstractNoiseRule):
         since = memory.window.now - jnp.max(memory.window.times)
         window = memory.window.with_newest(beyond, fresh)
         jump = jnp.where(fresh, jnp.abs(beyond * slopes(window, self.level)) * since, 0.0)
-        squared, count = seen.value @ cho_solve(cho_factor(S), seen.value), jnp.maximum(jnp.sum(seen.mask), 1)
-        surplus = jnp.minimum(squared / count, _MOST_NIS) - _expected(count.astype(squared.dtype))
+        whitened, count = forward(cholesky(S), seen.value[:, None]), jnp.maximum(jnp.sum(seen.mask), 1)
+        nis = jnp.minimum(jnp.sum(whitened**2) / count, _MOST_NIS)
+        surplus = nis - jnp.asarray(_expected(len(S)), nis.dtype)[count]
         moved = memory.log_scale + jnp.where(fresh, self.speed * surplus, 0.0)
         log_scale = jnp.clip(moved, -jnp.log(self.limit), jnp.log(self.limit))
         return Consistency(window, log_scale), jnp.diag(jnp.sqrt(jump))
@@ -88,12 +90,14 @@ class ConsistentFuzzyNoise(AbstractNoiseRule):
     def _beyond(self, seen: Innovation, S: Float[Array, "c c"]) -> Float[Array, " s"]:
         """(s,) the disturbance that explains the innovation, less what its covariance S does."""
         C = jnp.where(seen.mask[:, None], seen.C[:, : self.density.size], 0.0) * self.density
-        M = (self.density[:, None] * C.T) @ cho_solve(cho_factor(C @ C.T + _REST * S), jnp.eye(len(C), dtype=C.dtype))
-        change, own = M @ seen.value, jnp.sqrt(jnp.sum((M @ S) * M, axis=1))
+        L = cholesky(times(C, C.T) + _REST * S)
+        M = backward(L, forward(L, C * self.density)).T
+        change, own = M @ seen.value, jnp.sqrt(jnp.sum(times(M, S) * M, axis=1))
         return jnp.sign(change) * jnp.maximum(jnp.abs(change) - self.widths * own, 0.0)
 
 
-def _expected(count: Float[Array, ""]) -> Float[Array, ""]:
-    """E min(χ²/c, most) of c degrees of freedom."""
-    half, most = count / 2.0, count * _MOST_NIS / 2.0
+def _expected(channels: int) -> np.ndarray:
+    """E min(χ²/c, most) of c degrees of freedom, for c up to `channels`."""
+    count = np.arange(channels + 1)
+    half, most = np.maximum(count, 1) / 2.0, count * _MOST_NIS / 2.0
     return gammainc(half + 1.0, most) + _MOST_NIS * (1.0 - gammainc(half, most))

@@ -202,13 +202,12 @@ def augmented_predict(
     filter: AbstractFilter, state: FilterState, sample: Sample, G: Float[Array, "s m"]
 ) -> tuple[Float[Array, " n"], Float[Array, "q q"], Float[Array, "s s"]]:
     """The next state, what is kept of the uncertainty of [x, θ], and the Jacobian of the step by the state."""
-    process, p = filter.process, state.theta.size
-    x = process.step(state.x, state.theta, sample)
-
-    def change_after(change: Array, theta: Array) -> Array:
-        return process.apart(process.step(process.moved(state.x, change), theta, sample), x)
-
-    _, F, by_theta = linearised(change_after, jnp.zeros(len(filter.x_root), x.dtype), state.theta)
+    process, s, p = filter.process, len(filter.x_root), state.theta.size
+    after = lambda change, theta: process.step(process.moved(state.x, change), theta, sample)
+    x, *jacobians = linearised(after, jnp.zeros(s, state.x.dtype), state.theta)
+    # of the state's n numbers; of its ways to change
+    push = jax.linearize(lambda moved: process.apart(moved, x), x)[1]
+    F, by_theta = jnp.split(jax.vmap(push, 1, 1)(jnp.concatenate(jacobians, axis=1)), [s], axis=1)
     whole = jnp.block([[F, by_theta], [jnp.zeros_like(by_theta.T), jnp.eye(p, dtype=F.dtype)]])
     return x, filter.form.predict(state.joint, whole, _of_state(G, p)), F
 

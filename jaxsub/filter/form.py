@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jax.scipy.linalg import block_diag
 from jaxtyping import Array, Bool, Float
 
+from .small import times
 from .square_root import by_qr, by_svd, covariance_update, stacked, update
 
 
@@ -56,7 +57,7 @@ class SquareRoot(AbstractForm):
 
     def covariance(self, kept: Float[Array, "n n"]) -> Float[Array, "n n"]:
         """J Jᵀ."""
-        return kept @ kept.T
+        return times(kept, kept.T)
 
     def deviations(self, kept: Float[Array, "n n"]) -> Float[Array, " n"]:
         """Lengths of the rows of J."""
@@ -75,8 +76,8 @@ class SquareRoot(AbstractForm):
 
     def seen(self, kept: Float[Array, "n n"], C: Float[Array, "c n"]) -> Float[Array, "c c"]:
         """C J squared."""
-        CJ = C @ kept
-        return CJ @ CJ.T
+        CJ = times(C, kept)
+        return times(CJ, CJ.T)
 
     def restart(self, root: Float[Array, "n n"], kept: Float[Array, "q q"]) -> Float[Array, "q q"]:
         """The root of the marginal is made of the rows of J."""
@@ -100,7 +101,7 @@ class Covariance(AbstractForm):
 
     def predict(self, kept: Float[Array, "n n"], F: Float[Array, "n n"], G: Float[Array, "n m"]) -> Float[Array, "n n"]:
         """F P Fᵀ + G Gᵀ."""
-        return F @ kept @ F.T + G @ G.T
+        return times(times(F, kept), F.T) + times(G, G.T)
 
     def update(
         self, kept: Float[Array, "n n"], C: Float[Array, "c n"], R_root: Float[Array, "c c"], mask: Bool[Array, " c"]
@@ -110,7 +111,7 @@ class Covariance(AbstractForm):
 
     def seen(self, kept: Float[Array, "n n"], C: Float[Array, "c n"]) -> Float[Array, "c c"]:
         """From P itself."""
-        return C @ kept @ C.T
+        return times(times(C, kept), C.T)
 
     def restart(self, root: Float[Array, "n n"], kept: Float[Array, "q q"]) -> Float[Array, "q q"]:
         """The marginal is a block of P."""

@@ -75,11 +75,11 @@ def linearised(
     """The value of `f` at a change of the state and θ, and its Jacobians by both."""
     # one argument at a time: what depends on the parameters alone, such as a matrix exponential, has no state tangents
     value, by_change = _columns(lambda change: f(change, theta), change)
+    if not theta.size:
+        return value, by_change, jnp.zeros((*value.shape, 0), value.dtype)
     return value, by_change, _columns(lambda theta: f(change, theta), theta)[1]
 
 
 def _columns(f: Callable[[Array], Array], at: Float[Array, " q"]) -> tuple[Float[Array, " m"], Float[Array, "m q"]]:
     value, push = jax.linearize(f, at)
-    if not at.size:
-        return value, jnp.zeros((*value.shape, 0), value.dtype)
     return value, jax.vmap(push, out_axes=-1)(jnp.eye(at.size, dtype=at.dtype))

@@ -9,35 +9,35 @@ nothing else feels it.
 """
 
 import jax.numpy as jnp
-from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
-# so many rows are reflected without LAPACK, which takes a batch's matrices one by one: up to four times faster
-_UNROLLED = 8
+from .small import UNROLLED, backward, cholesky, forward, times
 
 
 def by_qr(M: Float[Array, "n m"]) -> Float[Array, "n n"]:
     """The lower-triangular J of non-negative diagonal with J Jᵀ = M Mᵀ, m ≥ n: the R factor of Mᵀ."""
-    if not 0 < len(M) <= _UNROLLED:
+    if not 0 < len(M) <= UNROLLED:
         R = jnp.linalg.qr(M.T, mode="r")
         return jnp.where(jnp.diag(R) < 0.0, -1.0, 1.0) * R.T
     columns = []
     for k in range(len(M)):
-        column, M = _reflected(M)
-        columns.append(jnp.concatenate([jnp.zeros(k, column.dtype), column]))
+        column, share = _reflected(M @ M[0], M[:, 0])
+        columns.append(jnp.pad(column, (k, 0)))
+        M = M[1:, 1:] - share[:, None] * M[0, 1:]
     return jnp.stack(columns, axis=1)
 
 
-def _reflected(M: Float[Array, "n m"]) -> tuple[Float[Array, " n"], Float[Array, "l k"]]:
-    """The first column of M and what is left below and beside it, after a Householder reflection of its first row."""
-    a = M[0]
-    along = M @ a
+def _reflected(along: Float[Array, " n"], first: Float[Array, " n"]) -> tuple[Float[Array, " n"], Float[Array, " l"]]:
+    """The `first` column of M after a Householder reflection of its first row a, and what the rows below lose of a.
+
+    `along` is M a. That share of a, less its first element, is to be taken from what is beside the column.
+    """
     none = along[0] == 0.0
     length = jnp.sqrt(jnp.where(none, 1.0, along[0]))
     column = along / length
     # of the vector [a₀ ± |a|, a₁ …] that the reflection turns round; of the two the one that does not cancel
-    share = (column[1:] + jnp.where(a[0] < 0.0, -1.0, 1.0) * M[1:, 0]) / (length + jnp.abs(a[0]))
-    return jnp.where(none, M[:, 0], column), M[1:, 1:] - share[:, None] * a[1:]
+    share = (column[1:] + jnp.where(first[0] < 0.0, -1.0, 1.0) * first[1:]) / (length + jnp.abs(first[0]))
+    return jnp.where(none, first, column), share
 
 
 def by_svd(M: Float[Array, "n m"]) -> Float[Array, "n n"]:
@@ -48,7 +48,7 @@ def by_svd(M: Float[Array, "n m"]) -> Float[Array, "n n"]:
 
 def stacked(F: Float[Array, "n q"], J: Float[Array, "q q2"], G: Float[Array, "n m"]) -> Float[Array, "n k"]:
     r"""$[FJ, G]$, a wide root of the predicted covariance $FPF^T + GG^T$; `by_qr` or `by_svd` makes it square."""
-    return jnp.concatenate([F @ J, G], axis=1)
+    return jnp.concatenate([times(F, J), G], axis=1)
 
 
 def present(
@@ -57,7 +57,7 @@ def present(
     r"""C and $R^c$ of the channels that `mask` has, the others neutral."""
     shared = jnp.where(mask[:, None] & mask[None, :], R_root @ R_root.T, jnp.diag(jnp.where(mask, 0.0, 1.0)))
     # a Cholesky factor squared and factored again is not quite itself
-    root = jnp.where(jnp.all(mask), R_root, jnp.linalg.cholesky(shared))
+    root = jnp.where(jnp.all(mask), R_root, cholesky(shared))
     return jnp.where(mask[:, None], C, 0.0), root
 
 
@@ -70,14 +70,16 @@ def update(
     Source: the manoeuvring paper, section 5; Andrews (1968), AIAA J. 6.
     """
     C, R_root = present(C, R_root, mask)
-    rows, columns = jnp.concatenate([C @ J, J]), []
+    rows, columns = jnp.concatenate([times(C, J), J]), []
     for k in range(len(C)):
-        noise = jnp.concatenate([R_root[k:, k], jnp.zeros(len(J), J.dtype)])
-        column, rows = _reflected(jnp.concatenate([noise[:, None], rows], axis=1))
-        columns.append(jnp.concatenate([jnp.zeros(k, J.dtype), column]))
+        # [Rᶜ, CJ] over [0, J], whose columns of noise wait beside the others for their turn
+        noise = jnp.pad(R_root[k:, k], (0, len(J)))
+        column, share = _reflected(noise * noise[0] + rows @ rows[0], noise)
+        columns.append(jnp.pad(column, (k, 0)))
+        rows = rows[1:] - share[:, None] * rows[0]
     whole = jnp.stack(columns, axis=1)
     L, W = whole[: len(C)], whole[len(C) :]
-    return solve_triangular(L, W.T, lower=True, trans=1).T, L, rows
+    return backward(L, W.T).T, L, rows
 
 
 def covariance_update(
@@ -85,7 +87,7 @@ def covariance_update(
 ) -> tuple[Float[Array, "n c"], Float[Array, "c c"], Float[Array, "n n"]]:
     """The same from the covariance P, by the standard form P⁺ = (I - K C) P."""
     C, R_root = present(C, R_root, mask)
-    PC = P @ C.T
-    L = jnp.linalg.cholesky(C @ PC + R_root @ R_root.T)
-    gain = solve_triangular(L, solve_triangular(L, PC.T, lower=True), lower=True, trans=1).T
-    return gain, L, P - gain @ PC.T
+    PC = times(P, C.T)
+    L = cholesky(times(C, PC) + R_root @ R_root.T)
+    gain = backward(L, forward(L, PC.T)).T
+    return gain, L, P - times(gain, PC.T)

@@ -1,5 +1,6 @@
 """Where a vehicle is and how it lies: attitude, position and strapdown filters, and streams that flight loops call."""
 
+from .ahead import Program, ahead_of_time
 from .alignment import Alignment, MagneticField, aligned
 from .attitude import Gyro, PaperAttitude, RotationAttitude
 from .constructed import (
@@ -13,7 +14,7 @@ from .constructed import (
 from .navigator import FlightReading, Navigated, NavigatorState, PaperNavigator
 from .position import Course, DeadReckoning
 from .strapdown import Inertial, SensorNoise, StrapdownNavigation
-from .stream import AbstractStream, Faults, Reading, Stream, StreamState, ahead_of_time, follow
+from .stream import AbstractStream, Faults, Reading, Stream, StreamState, follow
 
 __all__ = [
     "AbstractStream",
@@ -32,6 +33,7 @@ __all__ = [
     "NavigatorState",
     "PaperAttitude",
     "PaperNavigator",
+    "Program",
     "Reading",
     "RotationAttitude",
     "SensorNoise",

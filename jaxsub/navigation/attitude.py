@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..filter import AbstractProcess, Sample
-from .rotation import conjugate, euler, exponential, logarithm, omega_matrix, product, wrapped
+from .rotation import conjugate, euler, exponential, logarithm, omega_matrix, product, squared_length, wrapped
 
 
 class Gyro(eqx.Module):
@@ -113,6 +113,6 @@ class RotationAttitude(AbstractAttitude):
 
 def _unit(q: Float[Array, "4"]) -> Float[Array, "4"]:
     """q of unit length, the identity for one of none; what is not finite stays so, that the filter may say it."""
-    squared = q @ q
+    squared = squared_length(q)
     none = squared == 0.0
     return jnp.where(none, jnp.array([1.0, 0.0, 0.0, 0.0], q.dtype), q) / jnp.sqrt(jnp.where(none, 1.0, squared))

@@ -5,6 +5,7 @@ $R = R_z(\psi)R_y(\theta)R_x(\phi)$. Every function has finite values and deriva
 Source: Titterton and Weston (2004), §3; the angles' half-sums as in Bernardes and Viollet (2022), PLoS ONE 17.
 """
 
+import functools
 import math
 
 import jax
@@ -32,8 +33,16 @@ def omega_matrix(w: Float[Array, "3"]) -> Float[Array, "4 4"]:
 
 def product(q: Float[Array, "4"], p: Float[Array, "4"]) -> Float[Array, "4"]:
     """Hamilton's product, R(q p) = R(q) R(p)."""
-    w, v = q[0], q[1:]
-    return jnp.concatenate([(w * p[0] - v @ p[1:])[None], w * p[1:] + p[0] * v + jnp.cross(v, p[1:])])
+    w, x, y, z = q
+    a, b, c, d = p
+    return jnp.stack(
+        [
+            w * a - x * b - y * c - z * d,
+            w * b + x * a + y * d - z * c,
+            w * c - x * d + y * a + z * b,
+            w * d + x * c - y * b + z * a,
+        ]
+    )
 
 
 def conjugate(q: Float[Array, "4"]) -> Float[Array, "4"]:
@@ -43,7 +52,7 @@ def conjugate(q: Float[Array, "4"]) -> Float[Array, "4"]:
 
 def exponential(v: Float[Array, "3"]) -> Float[Array, "4"]:
     r"""The quaternion of a rotation by |v| rad about v: $[\cos\tfrac{|v|}2,\ \sin\tfrac{|v|}2\,v/|v|]$."""
-    squared = v @ v
+    squared = squared_length(v)
     small = squared < _SMALL
     angle = jnp.sqrt(jnp.where(small, 1.0, squared))
     cosine = jnp.where(small, 1.0 - squared / 8.0 + squared**2 / 384.0, jnp.cos(angle / 2.0))
@@ -55,7 +64,7 @@ def logarithm(q: Float[Array, "4"]) -> Float[Array, "3"]:
     """The shortest rotation vector, rad, that `exponential` turns into q or -q; at 180° either of two is."""
     q = normalised(q)
     w, v = jnp.abs(q[0]), jnp.where(q[0] < 0.0, -q[1:], q[1:])
-    squared = v @ v
+    squared = squared_length(v)
     small = squared < _SMALL * w**2
     length = jnp.sqrt(jnp.where(small, 1.0, squared))
     u = jnp.where(small, squared, 0.0) / jnp.where(small, w, 1.0) ** 2
@@ -65,12 +74,17 @@ def logarithm(q: Float[Array, "4"]) -> Float[Array, "3"]:
 
 def normalised(q: Float[Array, "4"]) -> Float[Array, "4"]:
     """q of unit length; the identity, without a derivative, for one of no length or one that is not finite."""
-    largest = jnp.max(jnp.abs(q))
+    largest = functools.reduce(jnp.maximum, jnp.abs(q))
     sound = jnp.isfinite(largest) & (largest >= jnp.finfo(q.dtype).tiny)
     q = jnp.where(sound, q, jnp.array([1.0, 0.0, 0.0, 0.0], q.dtype))
     # scaled first, for the square of a large number is infinite and that of a small one zero
-    q = q / jax.lax.stop_gradient(jnp.max(jnp.abs(q)))
-    return q / jnp.sqrt(q @ q)
+    q = q / jax.lax.stop_gradient(jnp.where(sound, largest, 1.0))
+    return q / jnp.sqrt(squared_length(q))
+
+
+def squared_length(v: Float[Array, " n"]) -> Float[Array, ""]:
+    """v·v, written out: a reduction is a kernel of its own, a sum is part of what is made of it."""
+    return functools.reduce(jnp.add, v * v)
 
 
 def matrix(q: Float[Array, "4"]) -> Float[Array, "3 3"]:

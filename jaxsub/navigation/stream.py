@@ -1,13 +1,12 @@
 """A filter in a flight loop: readings with time stamps in, estimates out, whatever the readings are like.
 
-On-line `Stream.step` takes a reading at a time, best compiled by `ahead_of_time`; off-line `follow` scans the same step
-over a recording, and `jax.vmap` of it over many. Nothing a reading holds makes the state anything but finite, and what
-was wrong with readings is counted.
+On-line `Stream.step` takes a reading at a time, best compiled by `ahead_of_time`; off-line `follow` scans the same
+step over a recording, and `jax.vmap` of it over many. Nothing a reading holds makes the state anything but finite, and
+what was wrong with readings is counted.
 """
 
 import abc
 import dataclasses
-from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
@@ -15,7 +14,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
-from ..errors import InputError
 from ..filter import AbstractFilter, Estimate, FilterState, Sample, select
 
 
@@ -214,23 +212,6 @@ class Stream(AbstractStream):
 def follow(stream: AbstractStream, state: Any, readings: Any) -> tuple[Any, Any]:
     """The state after K readings, stacked, and what was known after each; `jax.vmap` over many recordings."""
     return jax.lax.scan(lambda state, reading: stream.step(state, reading), state, readings)
-
-
-def ahead_of_time(stream: AbstractStream, state: Any, reading: Any) -> Callable[[Any, Any], tuple[Any, Any]]:
-    """`stream.step` compiled for states and readings like these; the stream's own numbers are part of the program.
-
-    **Raises** `InputError`, when called, for a state or a reading of other shapes or types.
-    """
-    compiled = jax.jit(lambda state, reading: stream.step(state, reading)).lower(state, reading).compile()
-
-    def step(state: Any, reading: Any) -> tuple[Any, Any]:
-        try:
-            return compiled(state, reading)
-        except TypeError as error:
-            what = f"not of the shapes and types that the step was compiled for ({error})"
-            raise InputError("reading", what, "give arrays like those given to ahead_of_time") from None
-
-    return step
 
 
 def _held(inputs: PyTree[Array], last: PyTree[Array]) -> tuple[PyTree[Array], Bool[Array, ""]]:

@@ -99,6 +99,6 @@ def test_float32_survives_a_precise_measurement_after_a_vague_prior():
         np.testing.assert_allclose(np.linalg.norm(a, axis=1), size, rtol=6e-3)
         if k >= 20:
             error = (a @ a.T - b @ b.T) / np.outer(size, size)
-            assert np.linalg.norm(error) < 1e-6
+            assert np.linalg.norm(error) < 2e-6
         lost |= not positive_definite(np.asarray(P, float) / np.outer(size, size))
     assert lost

@@ -9,9 +9,10 @@ import pytest
 from stream_cases import STOP, altered, at, attitude_stream, counted, gentle_readings, same, spliced, started
 
 from jaxsub.errors import InputError
-from jaxsub.filter import ConstantNoise, Sample
+from jaxsub.filter import ConstantNoise, RandomNoise, Sample
+from jaxsub.navigation.ahead import ahead_of_time
 from jaxsub.navigation.attitude import Gyro
-from jaxsub.navigation.stream import ahead_of_time, follow
+from jaxsub.navigation.stream import follow
 
 
 def test_in_flight_and_off_line_say_the_same():
@@ -20,10 +21,12 @@ def test_in_flight_and_off_line_say_the_same():
     stream = attitude_stream()
     state = started(stream, readings)
     last, estimates = follow(stream, state, readings)
-    step = ahead_of_time(stream, state, at(readings, 0))
+    program = ahead_of_time(stream, state, at(readings, 0))
+    packed = program.pack(state)
     for k in range(40):
-        state, estimate = step(state, at(readings, k))
+        packed, estimate = program.step(packed, at(readings, k))
         same(estimate, at(estimates, k), atol=1e-13)
+    state = program.unpack(packed)
     same(state, last, atol=1e-13)
     assert counted(state.faults) == {}
 
@@ -143,7 +146,8 @@ def test_a_gyro_at_its_stop_is_counted():
 def test_a_reading_of_another_shape_or_type_is_one_clear_error():
     readings, stream = gentle_readings(), attitude_stream()
     state, reading = started(stream, readings), at(readings, 0)
-    step = ahead_of_time(stream, state, reading)
+    program = ahead_of_time(stream, state, reading)
+    packed = program.pack(state)
     wrong = (
         dataclasses.replace(reading, outputs=jnp.zeros(4), mask=jnp.zeros(4, bool), scale=jnp.ones(4)),
         dataclasses.replace(reading, outputs=reading.outputs.astype(jnp.float32)),
@@ -151,6 +155,22 @@ def test_a_reading_of_another_shape_or_type_is_one_clear_error():
     )
     for bad in wrong:
         with pytest.raises(InputError, match=r"^reading: not of the shapes and types .*; give arrays like") as caught:
-            step(state, bad)
+            program.step(packed, bad)
         assert "\n" not in str(caught.value)
-    assert bool(jnp.isfinite(step(state, reading)[1].x).all())
+    with pytest.raises(InputError, match=r"^state: not of the shapes"):
+        program.pack(dataclasses.replace(state, taken=jnp.zeros(4, bool)))
+    assert bool(np.isfinite(program.step(packed, reading)[1].x).all())
+
+
+def test_a_packed_state_is_the_same_to_the_bit():
+    """Whole numbers, truth values and a random key among real numbers, all in the types that they had."""
+    readings = gentle_readings(dtype=jnp.float32)
+    key = jax.random.key_data(jax.random.key(2**31 + 5))
+    stream = attitude_stream(RandomNoise(jnp.full(6, 1e-3, jnp.float32), key), jnp.float32)
+    state, _ = follow(stream, started(stream, readings), readings)
+    program = ahead_of_time(stream, state, at(readings, 0))
+    again = program.unpack(program.pack(state))
+    assert jax.tree.structure(again) == jax.tree.structure(state)
+    for one, other in zip(jax.tree.leaves(again), jax.tree.leaves(state), strict=True):
+        assert one.dtype == other.dtype
+        np.testing.assert_array_equal(one, other)
