@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..effects import AbstractSensor
 from ..errors import InputError, nearest
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
@@ -99,9 +100,8 @@ def _flown(flight: _Flight, start: Array) -> tuple[Float[Array, "k s"], Float[Ar
     def advance(carry: tuple, sample: tuple) -> tuple[tuple, Array]:
         state, memory, nodes = carry
         k, reference, override, noise = sample
-        # a drift counts from the first sample, so the sensors are asked for that too
-        pair = jnp.stack([times[0], times[k]]), jnp.stack([state, state]), nodes[jnp.stack([k, k]), 0]
-        shown = dict(zip(vehicle.layout.channels, vehicle.measure(*pair)[1] + noise, strict=True))
+        outputs = vehicle.measure(times[k], state, nodes[k, 0]) + noise
+        shown = dict(zip(vehicle.layout.channels, outputs, strict=True))
         memory, deflections = flight.autopilot.command(memory, shown, reference, since[k], override)
         for name, column in fins.items():
             nodes = nodes.at[k, :, column].set(deflections[name])
@@ -111,7 +111,8 @@ def _flown(flight: _Flight, start: Array) -> tuple[Float[Array, "k s"], Float[Ar
 
     samples = (jnp.arange(len(step_of)), flight.reference, flight.override, flight.noise)
     (_, _, nodes), states = jax.lax.scan(advance, (start, flight.autopilot.init(), runs.nodes()[0]), samples)
-    return states, nodes[:, 0], vehicle.measure(times[:-1], states, nodes[:, 0])
+    signals = nodes[:, 0, :-1]  # less the time
+    return states, signals, vehicle.measure(times[:-1], states, signals)
 
 
 def _check(
@@ -127,6 +128,9 @@ def _check(
     for ways in autopilot.channels:
         if not set(ways) & set(layout.channels):
             raise InputError(f"{layout.name}: outputs", f"has no {' or '.join(ways)} to steer by", "measure it")
+    for effect in vehicle.effects:
+        if isinstance(effect, AbstractSensor) and effect.remembers:
+            raise InputError(layout.name, f"an autopilot cannot hold the memory of {effect.label}", "fly without it")
     columns = (*layout.held, *layout.interpolated)
     for kind, table, known in (("reference", reference, REFERENCES), ("given column", given, columns)):
         for key, values in table.items():

@@ -1,76 +1,112 @@
 """The vocabulary of left-out physics: every effect that a diagnosis may name, a file or two a family."""
 
-from .actuators import ActuatorDelay, ActuatorLag
+from .actuator_curves import ActuatorDeadband, ActuatorMisalignment, ActuatorSaturation, ControlSurfaceStall
+from .actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
 from .base import (
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
     AbstractSensor,
     admissible,
+    amplitude,
     amplitudes,
     number_fields,
     numbers,
     options,
     parameter_table,
+    shape,
     with_numbers,
 )
+from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
+from .environment import Current, WaveForcing
+from .events import MassShift, ThrustLoss
 from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss
 from .hull_damping import CubicDamping, QuadraticDamping
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
-from .mechanisms import CoulombFriction, CubicStiffness
-from .motion import CHANNEL_UNITS, EQUATIONS, FORCES, GRAVITY, VELOCITIES, Facts, Motion, Signal
-from .propulsion import PropellerTorque
+from .mechanisms import CoulombFriction, CubicStiffness, Saturation
+from .memory import AbstractMemory, FluidMemory, Hysteresis, with_memory
+from .motion import CHANNEL_UNITS, EQUATIONS, FORCES, GRAVITY, VELOCITIES, Facts, Motion, Signal, unit_per
+from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
+from .sensor_mounting import SensorLeverArm, SensorMisalignment
+from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
 from .sensors import SensorBias, SensorDrift, SensorScale
-
-VOCABULARY: tuple[type[AbstractEffect], ...] = (
-    QuadraticDamping,
-    CubicDamping,
-    CrossflowDrag,
-    CoriolisCoupling,
-    TurningSpeedLoss,
-    SpeedScaling,
-    HullAsymmetry,
-    TrimOffset,
-    BuoyancyError,
-    HullCompressibility,
-    DensityStratification,
-    ThermalExpansion,
-    PropellerTorque,
-    ActuatorLag,
-    ActuatorDelay,
-    CoulombFriction,
-    CubicStiffness,
-    SensorBias,
-    SensorScale,
-    SensorDrift,
-)
-
-
-def candidates(facts: Facts, vocabulary: tuple[type[AbstractEffect], ...] = VOCABULARY) -> list[AbstractEffect]:
-    """Every form of every effect that makes sense on a vehicle."""
-    return [effect for kind in vocabulary for effect in kind.candidates(facts)]
-
+from .smooth import KNOTS, SmoothForce, variables
+from .vocabulary import VOCABULARY, candidates, from_script, vocabulary
 
 __all__ = [
     "CHANNEL_UNITS",
     "EQUATIONS",
     "FORCES",
     "GRAVITY",
+    "KNOTS",
     "VELOCITIES",
     "VOCABULARY",
     "AbstractActuator",
     "AbstractEffect",
     "AbstractForce",
+    "AbstractMemory",
     "AbstractSensor",
+    "ActuatorBacklash",
+    "ActuatorDeadband",
+    "ActuatorDelay",
+    "ActuatorLag",
+    "ActuatorMisalignment",
+    "ActuatorRateLimit",
+    "ActuatorSaturation",
+    "BottomSuction",
+    "BuoyancyError",
+    "ControlSurfaceStall",
+    "CoriolisCoupling",
+    "CoulombFriction",
+    "CrossflowDrag",
+    "CubicDamping",
+    "CubicStiffness",
+    "Current",
+    "DensityStratification",
     "Facts",
+    "FluidMemory",
+    "FreeSurfaceSuction",
+    "HullAsymmetry",
+    "HullCompressibility",
+    "Hysteresis",
+    "MassShift",
     "Motion",
+    "PropellerAsymmetry",
+    "PropellerRace",
+    "PropellerTorque",
+    "QuadraticDamping",
+    "Saturation",
+    "SensorBias",
+    "SensorDelay",
+    "SensorDrift",
+    "SensorLeverArm",
+    "SensorMisalignment",
+    "SensorRectification",
+    "SensorSaturation",
+    "SensorScale",
     "Signal",
+    "SmoothForce",
+    "SpeedScaling",
+    "TetherDrag",
+    "ThermalExpansion",
+    "ThrustLoss",
+    "ThrusterCrossCoupling",
+    "TrimOffset",
+    "TurningSpeedLoss",
+    "WaveForcing",
     "admissible",
+    "amplitude",
     "amplitudes",
     "candidates",
+    "from_script",
     "number_fields",
     "numbers",
     "options",
     "parameter_table",
+    "shape",
+    "unit_per",
+    "variables",
+    "vocabulary",
+    "with_memory",
     "with_numbers",
 ]

@@ -1,4 +1,4 @@
-"""Actuator effects: what stands between a command and a deflection.
+"""Actuator effects with a memory: lag, delay, limited rate and play between a command and a deflection.
 
 An actuator does not feel the vehicle, so its answer is a function of the command's history alone and is worked out
 before the vehicle is integrated, at the start, middle and end of every sample interval.
@@ -17,6 +17,8 @@ from .base import AbstractActuator, shape
 from .motion import Facts
 
 _GRID = (0.5, 1.0, 2.0, 4.0, 8.0)
+# of the largest command
+PARTS = (0.02, 0.05, 0.1, 0.2, 0.4)
 
 
 def _grid(facts: Facts) -> list[float]:
@@ -92,3 +94,81 @@ class ActuatorDelay(AbstractActuator):
         shifted = jnp.interp(times - jnp.maximum(self.tau, 0.0), grid, integral)
         mean = jnp.diff(shifted) / jnp.diff(times)
         return jnp.broadcast_to(mean[:, None], nodes.shape)
+
+
+class ActuatorRateLimit(AbstractActuator):
+    r"""Limited rate: $|\dot\delta| \le R$, $R > 0$ in the actuator's unit per s.
+
+    Each interval gets the line with the mean and the slope of the ramp towards the held command, which has a derivative
+    in $R$ and leaves a command that is never limited as it is. The actuator starts at its first command.
+    Source: Fossen (2021), §9.5.
+    """
+
+    name: ClassVar[str] = "actuator-rate-limit"
+    family: ClassVar[str] = "actuators"
+    actuator: str = eqx.field(static=True)
+    rate: Array = shape("1/s", sign=+1, default=1.0)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[ActuatorRateLimit]":
+        """Each actuator with rates at which its largest step takes from 1.5 to 24 samples."""
+        fastest = {name: facts.input_range[name][2] for name in facts.actuators if name in facts.input_range}
+        return [cls(name, number(R / n)) for name, R in fastest.items() if R > 0.0 for n in (1.5, 3.0, 6.0, 12.0, 24.0)]
+
+    @property
+    def expression(self) -> str:
+        """The limit."""
+        return f"|d({self.actuator})/dt| <= R"
+
+    def symbols(self) -> dict[str, str]:
+        """`R`."""
+        return {"rate": "R"}
+
+    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+        """The limited deflection."""
+        most = jnp.maximum(self.rate, 1e-9) * jnp.diff(times)
+
+        def interval(held: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
+            command, reach = step
+            moved = jnp.clip(command - held, -reach, reach)
+            part = jnp.minimum(jnp.abs(command - held) / reach, 1.0)  # of the interval, until the command is reached
+            mean, slope = held + moved * (1.0 - 0.5 * part), moved * part * (3.0 - 2.0 * part)
+            return held + moved, jnp.stack([mean - 0.5 * slope, mean, mean + 0.5 * slope])
+
+        # an actuator before this one may have bent the command: its mean is what counts
+        commands = nodes @ jnp.array([1.0, 4.0, 1.0]) / 6.0
+        return jax.lax.scan(interval, commands[0], (commands, most))[1]
+
+
+class ActuatorBacklash(AbstractActuator):
+    r"""Play in the linkage: the deflection stands still until the command has crossed the gap $2b$, $b \ge 0$.
+
+    $\delta \leftarrow \min(\max(\delta, \delta_{cmd} - b), \delta_{cmd} + b)$; it starts at its first command.
+    Source: Tao and Kokotovic (1996), §2; Fossen (2021), §9.5.
+    """
+
+    name: ClassVar[str] = "actuator-backlash"
+    family: ClassVar[str] = "actuators"
+    actuator: str = eqx.field(static=True)
+    b: Array = shape("1", sign=+1, default=0.01)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[ActuatorBacklash]":
+        """Each actuator with gaps of a few to forty per cent of its largest command."""
+        largest = {name: facts.input_range[name][1] for name in facts.actuators if name in facts.input_range}
+        return [cls(name, number(part * size)) for name, size in largest.items() if size > 0.0 for part in PARTS]
+
+    @property
+    def expression(self) -> str:
+        """The play."""
+        return f"|command - {self.actuator}| <= b, at rest inside"
+
+    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+        """The deflection behind the play."""
+        gap = jnp.maximum(self.b, 0.0)
+
+        def follow(held: Array, command: Array) -> tuple[Array, Array]:
+            after = jnp.clip(held, command - gap, command + gap)
+            return after, after
+
+        return jax.lax.scan(follow, nodes[0, 0], nodes.ravel())[1].reshape(nodes.shape)

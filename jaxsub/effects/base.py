@@ -70,6 +70,10 @@ class AbstractEffect(eqx.Module):
         """The unit of each numeric field."""
         return {field.name: field.metadata["unit"] for field in number_fields(self)}
 
+    def signs(self) -> dict[str, int]:
+        """The only sign that physics admits of each numeric field, +1 or -1; 0 admits both."""
+        return {field.name: field.metadata["sign"] for field in number_fields(self)}
+
 
 class AbstractForce(AbstractEffect):
     """An effect that adds generalised forces to the equations of motion."""
@@ -99,9 +103,19 @@ class AbstractSensor(AbstractEffect):
 
     channel: eqx.AbstractVar[str]
 
+    # whether it shows something of earlier samples, which a filter or an autopilot does not keep
+    remembers: ClassVar[bool] = False
+
     @abc.abstractmethod
-    def measure(self, times: Float[Array, " *k"], output: Float[Array, " *k"]) -> Float[Array, " *k"]:
-        """What the sensor shows for the true `output`."""
+    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+        """What the sensor shows at `times` (s from the run's start), given the `outputs` of all sensors without it.
+
+        Leading axes of `outputs` and `motion` follow those of `times`, the last of which is time.
+        """
+
+    def undone(self, times: Float[Array, " *k"], recorded: Float[Array, " *k"]) -> Float[Array, " *k"]:
+        """`recorded`, of one run, brought to the times at which it was true; only what `remembers` has to say how."""
+        return recorded
 
     @property
     def where(self) -> tuple[str, ...]:
@@ -134,11 +148,11 @@ def options(effect: AbstractEffect) -> dict[str, Any]:
 def parameter_table(effect: AbstractEffect) -> dict[str, Parameter]:
     """A free `Parameter` for each numeric field. Signs are judged after the fit, not forced in it: a fit that wants
     a negative drag is evidence against the effect, and a bound would hide it."""
-    symbols, units = effect.symbols(), effect.units()
+    symbols, units, signs = effect.symbols(), effect.units(), effect.signs()
     rows = {}
     for field in number_fields(effect):
         # a shape such as a time constant has no meaning below zero, so there the bound is the physics
-        lower = 0.0 if field.metadata["role"] == "shape" and field.metadata["sign"] > 0 else -math.inf
+        lower = 0.0 if field.metadata["role"] == "shape" and signs[field.name] > 0 else -math.inf
         name = f"{effect.label}.{symbols[field.name]}"
         rows[field.name] = Parameter(name, units[field.name], lower=lower)
     return rows
@@ -146,8 +160,7 @@ def parameter_table(effect: AbstractEffect) -> dict[str, Parameter]:
 
 def admissible(effect: AbstractEffect, values: dict[str, float]) -> bool:
     """Whether every value has the sign that physics asks of it."""
-    signs = {field.name: field.metadata["sign"] for field in number_fields(effect)}
-    return all(values[name] * sign >= 0.0 for name, sign in signs.items())
+    return all(values[name] * sign >= 0.0 for name, sign in effect.signs().items())
 
 
 def with_numbers(effect: AbstractEffect, values: Mapping[str, ArrayLike]) -> Any:

@@ -123,8 +123,7 @@ class TurningSpeedLoss(AbstractForce):
         planes = [("sway", "yaw"), ("heave", "pitch")]
         pairs = [(a, b) for plane in planes for a, b in ((plane[0],) * 2, plane, (plane[1],) * 2)]
         free = [pair for pair in pairs if set(pair) <= set(facts.equations)]
-        fins = [(name, name) for name in facts.actuators if name not in ("thrust", "shaft_speed")]
-        return [cls(*pair) for pair in free + fins]
+        return [cls(*pair) for pair in free + [(fin, fin) for fin in facts.fins]]
 
     @property
     def where(self) -> tuple[str, ...]:
@@ -139,6 +138,10 @@ class TurningSpeedLoss(AbstractForce):
     def units(self) -> dict[str, str]:
         """Force per product."""
         return {"coefficient": unit_per("surge", self.first, self.second)}
+
+    def signs(self) -> dict[str, int]:
+        """A square does not propel."""
+        return {"coefficient": -1 if self.first == self.second else 0}
 
     @property
     def expression(self) -> str:

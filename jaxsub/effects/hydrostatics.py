@@ -24,6 +24,18 @@ def lift(motion: Motion, newton: Signal) -> dict[str, Signal]:
     }
 
 
+def lift_moments(motion: Motion, axis: str, arm: Signal | float) -> dict[str, Signal]:
+    """Moment of a lift that acts off the origin along a body `axis`; `arm` is the lift times its distance, N m."""
+    phi, theta = motion.positions["phi"], motion.positions["theta"]
+    level, rolled, pitched = jnp.cos(phi) * jnp.cos(theta), jnp.sin(phi) * jnp.cos(theta), jnp.sin(theta)
+    moments: dict[str, dict[str, Signal]] = {
+        "x": {"pitch": arm * level, "yaw": -arm * rolled},
+        "y": {"roll": -arm * level, "yaw": -arm * pitched},
+        "z": {"roll": arm * rolled, "pitch": arm * pitched},
+    }
+    return moments[axis]
+
+
 def _floats(facts: Facts) -> bool:
     return facts.kind == "submerged-body" and bool({"surge", "heave"} & set(facts.equations))
 
@@ -85,15 +97,7 @@ class TrimOffset(AbstractForce):
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The moments along the motion."""
-        phi, theta = motion.positions["phi"], motion.positions["theta"]
-        arm = self.offset * motion.buoyancy
-        level, rolled, pitched = jnp.cos(phi) * jnp.cos(theta), jnp.sin(phi) * jnp.cos(theta), jnp.sin(theta)
-        moments: dict[str, dict[str, Signal]] = {
-            "x": {"pitch": arm * level, "yaw": -arm * rolled},
-            "y": {"roll": -arm * level, "yaw": -arm * pitched},
-            "z": {"roll": arm * rolled, "pitch": arm * pitched},
-        }
-        return moments[self.axis]
+        return lift_moments(motion, self.axis, self.offset * motion.buoyancy)
 
 
 class BuoyancyError(_ExtraBuoyancy):

@@ -1,4 +1,4 @@
-"""Effects of mechanisms: dry friction and springs that stiffen."""
+"""Effects of mechanisms: dry friction, springs that stiffen and springs that level off."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -7,7 +7,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .base import AbstractForce, amplitude
+from ..parameters import number
+from .base import AbstractForce, amplitude, shape
 from .motion import Facts, Motion, Signal
 
 
@@ -77,3 +78,38 @@ class CubicStiffness(AbstractForce):
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The restoring force along the motion."""
         return {self.equation: -self.k_3 * motion.positions[self.equation] ** 3}
+
+
+class Saturation(AbstractForce):
+    r"""A restoring force that levels off: $F = -F_s\tanh(q/x_s)$, $F_s \ge 0$, $x_s > 0$ where it does so.
+
+    Beside a linear spring it takes over part of that one's stiffness at small q. Limits of a drive are
+    `actuator-saturation`. Source: Khalil (2002), §1.2; Schetzen (1980).
+    """
+
+    name: ClassVar[str] = "saturation"
+    family: ClassVar[str] = "mechanisms"
+    equation: str = eqx.field(static=True)
+    F_s: Array = amplitude("1", sign=+1)
+    x_s: Array = shape("1", sign=+1, default=1.0)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[Saturation]":
+        """Each coordinate of a mechanism, levelling off at a tenth of how far it went to all of it."""
+        far = facts.position_scale if facts.kind == "mechanism" else {}
+        parts = (0.1, 0.2, 0.4, 0.7, 1.0)
+        return [cls(e, x_s=number(part * far[e])) for e in facts.equations if far.get(e, 0.0) > 0.0 for part in parts]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one coordinate."""
+        return (self.equation,)
+
+    @property
+    def expression(self) -> str:
+        """The restoring force."""
+        return f"-F_s tanh({self.equation} / x_s)"
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """The restoring force along the motion."""
+        return {self.equation: -self.F_s * jnp.tanh(motion.positions[self.equation] / jnp.maximum(self.x_s, 1e-9))}

@@ -11,6 +11,7 @@ EQUATIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 VELOCITIES: dict[str, str] = dict(zip(EQUATIONS, "uvwpqr", strict=True))
 FORCES: dict[str, str] = dict(zip(EQUATIONS, "XYZKMN", strict=True))
 GRAVITY = 9.80665
+PROPULSION = ("shaft_speed", "thrust")
 _CHANNELS = {
     "m/s": ("u", "v", "w", "speed", "depth_rate"),
     "rad/s": ("p", "q", "r", "heading_rate"),
@@ -41,15 +42,21 @@ class Motion(eqx.Module):
     - `inertia`: (n, n) mass matrix of the equations in `rates`.
     - `buoyancy`: displaced weight (N); zero for a mechanism.
     - `cruise`: the operating speed U_c (m/s) about which linear coefficients were taken.
+    - `damping`: (n, n) linear damping of the equations in `rates`; times a velocity it is a force.
+    - `time`: s from the run's own start.
+    - `accelerations`: rates of the free equations' velocities, where an accelerometer asks for them.
     """
 
     rates: dict[str, Signal]
     positions: dict[str, Signal]
     actuators: dict[str, Signal]
     environment: dict[str, Signal]
-    inertia: Float[Array, "n n"]
+    inertia: Float[Signal, "n n"]
     buoyancy: Signal | float
     cruise: Signal | float
+    damping: Float[Signal, "n n"]
+    time: Signal | float = 0.0
+    accelerations: dict[str, Signal] = eqx.field(default_factory=dict)
 
 
 class Facts(eqx.Module):
@@ -62,7 +69,13 @@ class Facts(eqx.Module):
     - `actuators`, `channels`, `environment`: names of what is recorded.
     - `length`, `diameter`: of the hull, m (zero for a mechanism).
     - `rate_scale`: rms velocity of each free equation along the recordings.
-    - `sample_interval`: the recordings' median, s.
+    - `sample_interval`: the recordings' median, s. `duration`: of the longest, s.
+    - `position_scale`: largest size of each coordinate of a mechanism.
+    - `input_range`: rms, largest size and largest rate (per s) of each actuator's command.
+    - `output_range`: least and largest of what was recorded of each channel.
+    - `depth_range`: least and largest depth, m.
+
+    What is not known (zero or absent) has no candidates whose grid is taken from it.
     """
 
     kind: str
@@ -74,3 +87,19 @@ class Facts(eqx.Module):
     diameter: float
     rate_scale: dict[str, float]
     sample_interval: float
+    duration: float = 0.0
+    position_scale: dict[str, float] = eqx.field(default_factory=dict)
+    input_range: dict[str, tuple[float, float, float]] = eqx.field(default_factory=dict)
+    output_range: dict[str, tuple[float, float]] = eqx.field(default_factory=dict)
+    depth_range: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def fins(self) -> tuple[str, ...]:
+        """The actuators of a body that deflect."""
+        body = self.kind == "submerged-body"
+        return tuple(name for name in self.actuators if body and name not in PROPULSION)
+
+    @property
+    def propulsion(self) -> tuple[str, ...]:
+        """The actuators of a body that push."""
+        return tuple(name for name in PROPULSION if self.kind == "submerged-body" and name in self.actuators)

@@ -7,7 +7,7 @@ import equinox as eqx
 from jaxtyping import Array
 
 from .base import AbstractForce, amplitude
-from .motion import Facts, Motion, Signal
+from .motion import FORCES, Facts, Motion, Signal, unit_per
 
 
 class PropellerTorque(AbstractForce):
@@ -55,3 +55,147 @@ class PropellerTorque(AbstractForce):
         if self.grows_with == "thrust":
             return {"roll": self.torque * motion.actuators["thrust"]}
         return {"roll": self.torque + 0.0 * motion.rates["roll"]}
+
+
+def push(motion: Motion, by: str) -> Signal:
+    """What the forces of a propeller grow with: the recorded thrust (N), or $|n|n$ of the shaft speed n (rad/s)."""
+    recorded = motion.actuators[by]
+    return recorded if by == "thrust" else abs(recorded) * recorded
+
+
+def _unit(force: str, by: str) -> str:
+    """The unit of what multiplies `push` to give a force."""
+    return f"{force}/N" if by == "thrust" else f"{force}/(rad/s)/(rad/s)"
+
+
+def _written(by: str) -> str:
+    return "T" if by == "thrust" else "|n| n"
+
+
+class PropellerAsymmetry(AbstractForce):
+    r"""Side force or moment of a propeller off the axis or in an uneven wake: $\tau_i = c\,s$ of either sign.
+
+    s is the recorded thrust T, or $|n|n$ of the recorded shaft speed n; where that does not change, no one can tell it
+    from an asymmetric hull. Source: Carlton (2018), §6 (propeller walk).
+    """
+
+    name: ClassVar[str] = "propeller-asymmetry"
+    family: ClassVar[str] = "propulsion"
+    equation: str = eqx.field(static=True)
+    by: str = eqx.field(static=True)
+    c: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[PropellerAsymmetry]":
+        """Each free equation across the hull, where propulsion is recorded."""
+        across = [e for e in ("sway", "heave", "pitch", "yaw") if e in facts.equations]
+        return [cls(e, by) for e in across for by in facts.propulsion[:1]]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.equation,)
+
+    def symbols(self) -> dict[str, str]:
+        """SNAME symbol such as `Y_nn` or `N_T`."""
+        return {"c": f"{FORCES[self.equation]}_{'T' if self.by == 'thrust' else 'nn'}"}
+
+    def units(self) -> dict[str, str]:
+        """Force per thrust, or per square of the shaft speed."""
+        return {"c": _unit(unit_per(self.equation), self.by)}
+
+    @property
+    def expression(self) -> str:
+        """The force."""
+        return f"{self.symbols()['c']} {_written(self.by)}"
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """The force along the motion."""
+        return {self.equation: self.c * push(motion, self.by)}
+
+
+class PropellerRace(AbstractForce):
+    r"""A fin in the race of the propeller: its force grows with thrust, $\tau_i = c\,\delta\,s$ of either sign.
+
+    s is the recorded thrust T, or $|n|n$ of the recorded shaft speed n: by momentum theory the square of the speed at
+    the fin is $u^2 + 8T/(\pi\rho D^2)$. Source: Fossen (2021), §9.5; Söding (1982).
+    """
+
+    name: ClassVar[str] = "propeller-race"
+    family: ClassVar[str] = "actuators"
+    equation: str = eqx.field(static=True)
+    fin: str = eqx.field(static=True)
+    by: str = eqx.field(static=True)
+    c: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[PropellerRace]":
+        """Rudders in sway and yaw, stern planes and elevators in heave and pitch, where propulsion is recorded."""
+        turned = {fin: ("sway", "yaw") if fin == "rudder" else ("heave", "pitch") for fin in facts.fins}
+        pairs = [(e, fin) for fin, plane in turned.items() for e in plane if e in facts.equations]
+        return [cls(e, fin, by) for e, fin in pairs for by in facts.propulsion[:1]]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.equation,)
+
+    def symbols(self) -> dict[str, str]:
+        """SNAME symbol such as `N_rudder_nn` or `N_rudder_T`."""
+        return {"c": f"{FORCES[self.equation]}_{self.fin}_{'T' if self.by == 'thrust' else 'nn'}"}
+
+    def units(self) -> dict[str, str]:
+        """Force per deflection and thrust, or square of the shaft speed."""
+        return {"c": _unit(unit_per(self.equation, self.fin), self.by)}
+
+    @property
+    def expression(self) -> str:
+        """The force."""
+        return f"{self.symbols()['c']} {self.fin} {_written(self.by)}"
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """The extra force of the fin along the motion."""
+        return {self.equation: self.c * motion.actuators[self.fin] * push(motion, self.by)}
+
+
+class ThrusterCrossCoupling(AbstractForce):
+    r"""An actuator that also acts on an equation other than its own: $\tau_i = c\,\delta_a$ of either sign.
+
+    Source: Fossen (2021), §11.2: an entry of the thrust configuration matrix that the model has as zero.
+    """
+
+    name: ClassVar[str] = "thruster-cross-coupling"
+    family: ClassVar[str] = "propulsion"
+    equation: str = eqx.field(static=True)
+    actuator: str = eqx.field(static=True)
+    c: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[ThrusterCrossCoupling]":
+        """Each fin or drive on each free equation but surge; one that the model has already adds nothing."""
+        acting = facts.fins if facts.kind == "submerged-body" else facts.actuators
+        return [cls(e, a) for e in facts.equations if e != "surge" for a in acting]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.equation,)
+
+    def symbols(self) -> dict[str, str]:
+        """SNAME symbol such as `K_rudder`; `B_q_drive` for a mechanism's coordinate."""
+        if self.equation in FORCES:
+            return {"c": f"{FORCES[self.equation]}_{self.actuator}"}
+        return {"c": f"B_{self.equation}_{self.actuator}"}
+
+    def units(self) -> dict[str, str]:
+        """Force per deflection."""
+        return {"c": unit_per(self.equation, self.actuator)}
+
+    @property
+    def expression(self) -> str:
+        """The force."""
+        return f"{self.symbols()['c']} {self.actuator}"
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """The force along the motion."""
+        return {self.equation: self.c * motion.actuators[self.actuator]}

@@ -1,13 +1,14 @@
-"""Sensor effects: what stands between the truth and its recording."""
+"""Sensor effects: bias, scale and drift of what stands between the truth and its recording."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .base import AbstractSensor, amplitude
-from .motion import CHANNEL_UNITS, Facts
+from .motion import CHANNEL_UNITS, Facts, Motion, Signal
 
 
 class SensorBias(AbstractSensor):
@@ -32,9 +33,9 @@ class SensorBias(AbstractSensor):
         """The bias."""
         return f"{self.channel} measured = {self.channel} + b"
 
-    def measure(self, times: Float[Array, " *k"], output: Float[Array, " *k"]) -> Float[Array, " *k"]:
+    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
         """The biased output."""
-        return output + self.bias
+        return jnp.asarray(outputs[self.channel] + self.bias)
 
 
 class SensorScale(AbstractSensor):
@@ -55,13 +56,13 @@ class SensorScale(AbstractSensor):
         """The scale."""
         return f"{self.channel} measured = (1 + s) {self.channel}"
 
-    def measure(self, times: Float[Array, " *k"], output: Float[Array, " *k"]) -> Float[Array, " *k"]:
+    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
         """The scaled output."""
-        return (1.0 + self.scale) * output
+        return jnp.asarray((1.0 + self.scale) * outputs[self.channel])
 
 
 class SensorDrift(AbstractSensor):
-    r"""An error that grows with time: $z = y + d\,(t - t_0)$. Source: Titterton and Weston (2004), §4."""
+    r"""An error that grows with the time of the run: $z = y + d\,t$. Source: Titterton and Weston (2004), §4."""
 
     name: ClassVar[str] = "sensor-drift"
     family: ClassVar[str] = "sensors"
@@ -80,8 +81,8 @@ class SensorDrift(AbstractSensor):
     @property
     def expression(self) -> str:
         """The drift."""
-        return f"{self.channel} measured = {self.channel} + d (t - t_0)"
+        return f"{self.channel} measured = {self.channel} + d t"
 
-    def measure(self, times: Float[Array, " *k"], output: Float[Array, " *k"]) -> Float[Array, " *k"]:
+    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
         """The drifting output."""
-        return output + self.drift * (times - times[..., :1])
+        return jnp.asarray(outputs[self.channel] + self.drift * times)

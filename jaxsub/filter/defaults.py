@@ -32,7 +32,7 @@ def state_scale(vehicle: AbstractVehicle, sigma: Float[Array, " c"]) -> Float[Ar
     partner = _PARTNERS if body else {f"{e}_rate": e for e in layout.equations}
     partner = partner | {position: rate for rate, position in partner.items()}
     usual = lambda name: jnp.asarray(_USUAL.get(CHANNEL_UNITS.get(name, ""), 1.0))
-    return jnp.stack([known.get(n, known.get(partner[n], usual(n))) for n in (*rates, *layout.positions)])
+    return jnp.stack([known.get(n, known.get(partner.get(n, ""), usual(n))) for n in (*rates, *layout.positions)])
 
 
 def vehicle_filter(

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..effects import AbstractActuator
+from ..effects import AbstractActuator, AbstractSensor
 from ..errors import InputError
 from ..parameters import Transform
 from ..recording.runs import Runs
@@ -20,11 +20,11 @@ class Drive(eqx.Module):
 
     **Fields**
 
-    - `nodes`: (3, m) signals at the start, middle and end of the interval before it.
+    - `nodes`: (3, m + 1) signals and time at the start, middle and end of the interval before it.
     - `time`: s from the start of the run. `signals`: (m,) at the sample.
     """
 
-    nodes: Float[Array, "*k 3 m"]
+    nodes: Float[Array, "*k 3 m1"]
     time: Float[Array, " *k"]
     signals: Float[Array, "*k m"]
 
@@ -37,7 +37,7 @@ class VehicleProcess(AbstractProcess):
     - `vehicle`: what is not free. `transform`: between its free parameters and $\theta$.
     - `substeps`: steps in each sample interval.
 
-    **Raises** `InputError` for an effect on an actuator, whose memory is no part of the vehicle's state.
+    **Raises** `InputError` for an effect on an actuator, and a sensor's delay: their memory is no part of the state.
     """
 
     vehicle: AbstractVehicle
@@ -46,7 +46,7 @@ class VehicleProcess(AbstractProcess):
 
     def __check_init__(self):
         for effect in self.vehicle.effects:
-            if isinstance(effect, AbstractActuator):
+            if isinstance(effect, AbstractActuator) or (isinstance(effect, AbstractSensor) and effect.remembers):
                 remedy = "filter without it, or fit by the output error"
                 raise InputError(self.vehicle.layout.name, f"a filter cannot hold the memory of {effect.label}", remedy)
 

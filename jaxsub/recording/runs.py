@@ -34,10 +34,11 @@ class Runs(eqx.Module):
     held: tuple[bool, ...] = eqx.field(static=True)
     substeps: int = eqx.field(static=True, default=1)
 
-    def nodes(self) -> Float[Array, "r k1 3 m"]:
-        """Signals at the start, middle and end of each interval."""
-        start, after = self.signals[:, :-1], self.signals[:, 1:]
-        end = jnp.where(jnp.array(self.held, bool), start, after)
+    def nodes(self) -> Float[Array, "r k1 3 m1"]:
+        """Signals, and after them the time (s), at the start, middle and end of each interval."""
+        timed = jnp.concatenate([self.signals, self.times[..., None]], axis=-1)
+        start, after = timed[:, :-1], timed[:, 1:]
+        end = jnp.where(jnp.array([*self.held, False]), start, after)
         return jnp.stack([start, 0.5 * (start + end), end], axis=2)
 
     def samples(self) -> Int[Array, " c"]:
@@ -66,7 +67,7 @@ class Runs(eqx.Module):
         index = length * np.arange(count)[:, None] + np.arange(length + 1)
         inside = np.minimum(index, samples - 1)
         between = np.minimum(index[:, :-1], samples - 2)
-        cut = lambda array, at: array[:, at].reshape(-1, *at.shape[1:], *array.shape[2:])
+        cut = lambda array, at: array[:, at].reshape(count * len(array), *at.shape[1:], *array.shape[2:])
         owned = (np.arange(length + 1) < length) | (np.arange(count) == count - 1)[:, None]
         owned = jnp.asarray(owned & (index < samples))
         real = jnp.asarray(index[:, 1:] < samples)

@@ -13,6 +13,7 @@ from ..effects import (
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
+    AbstractMemory,
     AbstractSensor,
     Motion,
     Signal,
@@ -40,7 +41,8 @@ class Layout:
     **Fields**
 
     - `name`, `kind`: as in the file.
-    - `equations`: the free equations of motion, in order; `positions`: the position states, in order.
+    - `equations`: the free equations of motion, in order; `positions`: the position states, in order, then those of
+      effects with a memory.
     - `inputs`, `prescribed`, `environment`: (name in the model, column in the recording) pairs. Inputs are held
       between samples; the other two are interpolated.
     - `outputs`: the measured channels.
@@ -84,8 +86,9 @@ class Layout:
 class AbstractVehicle(eqx.Module):
     r"""Equations of motion $\tilde M\dot\nu = \tilde A\nu + \tau(\nu, \eta, \delta, t)$.
 
-    $\tau$ is all that is not linear damping. A state is [ν of the free equations, positions]; signals are the columns
-    of inputs, prescribed motions and surroundings in that order. All methods take any leading axes.
+    $\tau$ is all that is not linear damping. A state is [ν of the free equations, positions], the states of effects
+    with a memory last among the positions; signals are the columns of inputs, prescribed motions and surroundings in
+    that order, and may end with the time (s), which is otherwise 0. All methods take any leading axes.
     """
 
     layout: eqx.AbstractVar[Layout]
@@ -116,8 +119,8 @@ class AbstractVehicle(eqx.Module):
         """Generalised forces (N, N m) other than linear damping of the free equations and effects."""
 
     @abc.abstractmethod
-    def position_rates(self, motion: Motion) -> dict[str, Signal]:
-        """Rates of the position states."""
+    def own_position_rates(self, motion: Motion) -> dict[str, Signal]:
+        """Rates of the position states, without its effects'."""
 
     @abc.abstractmethod
     def channels(self, motion: Motion, acceleration: Mapping[str, Signal]) -> dict[str, Signal]:
@@ -144,16 +147,28 @@ class AbstractVehicle(eqx.Module):
         layout = dataclasses.replace(
             self.layout, parameters=(*self.layout.parameters, *parameter_table(effect).values())
         )
+        layout = dataclasses.replace(layout, positions=layout.positions + memory_states((effect,)))
         return dataclasses.replace(self, effects=(*self.effects, effect), layout=layout)
 
     def without_effect(self, label: str) -> Self:
         """The same vehicle less the effect of that label."""
         gone = {row.name for e in self.effects if e.label == label for row in parameter_table(e).values()}
-        layout = dataclasses.replace(
-            self.layout, parameters=tuple(p for p in self.layout.parameters if p.name not in gone)
-        )
         kept = tuple(e for e in self.effects if e.label != label)
+        lost = memory_states(tuple(e for e in self.effects if e.label == label))
+        layout = dataclasses.replace(
+            self.layout,
+            parameters=tuple(p for p in self.layout.parameters if p.name not in gone),
+            positions=tuple(name for name in self.layout.positions if name not in lost),
+        )
         return dataclasses.replace(self, effects=kept, layout=layout)
+
+    def position_rates(self, motion: Motion) -> dict[str, Signal]:
+        """Rates of the position states, effects included."""
+        rates = self.own_position_rates(motion)
+        for effect in self.effects:
+            if isinstance(effect, AbstractMemory):
+                rates = rates | effect.memory_rates(motion)
+        return rates
 
     def force(self, motion: Motion) -> Float[Array, "*k n"]:
         """All generalised forces (N, N m) other than linear damping, effects included."""
@@ -182,22 +197,45 @@ class AbstractVehicle(eqx.Module):
     def measure(
         self, times: Float[Array, " *k"], state: Float[Array, "*k s"], signals: Float[Array, "*k m"]
     ) -> Float[Array, "*k c"]:
-        """What the sensors show."""
-        motion = self.motion(state, signals)
-        rates = self.acceleration(state, signals) if {"ax", "ay", "az"} & set(self.layout.channels) else None
-        named = {} if rates is None else {e: rates[..., i] for i, e in enumerate(self.layout.equations)}
-        true = self.channels(motion, named)
-        shown = {name: jnp.asarray(true[name]) for name in self.layout.channels}
+        """What the sensors show at `times`, s from the run's start."""
+        shown, motion = self.truth(times, state, signals)
         for effect in self.effects:
             if isinstance(effect, AbstractSensor):
-                shown[effect.channel] = effect.measure(times, shown[effect.channel])
+                shown[effect.channel] = effect.measure(times, shown, motion)
         return stack(shown, self.layout.channels, times)
+
+    def truth(
+        self, times: Float[Array, " *k"], state: Float[Array, "*k s"], signals: Float[Array, "*k m"]
+    ) -> tuple[dict[str, Signal], Motion]:
+        """The measured channels before any effect on a sensor, and the motion that the sensors see."""
+        columns = len(self.layout.held) + len(self.layout.interpolated)
+        timed = jnp.concatenate([signals[..., :columns], times[..., None]], axis=-1)
+        motion = self.motion(state, timed)
+        if {"ax", "ay", "az"} & set(self.layout.channels):
+            rates = self.acceleration(state, timed)
+            named: dict[str, Signal] = {e: rates[..., i] for i, e in enumerate(self.layout.equations)}
+            motion = dataclasses.replace(motion, accelerations=named)
+        true = self.channels(motion, motion.accelerations)
+        shown = {name: jnp.broadcast_to(jnp.asarray(true[name]), times.shape) for name in self.layout.channels}
+        return dict(shown), motion
 
     def deviation(self, measured: Float[Array, "*k c"], modelled: Float[Array, "*k c"]) -> Float[Array, "*k c"]:
         """`measured` minus `modelled` channels; angles of a body wrapped to (-π, π]."""
         difference = measured - modelled
         turns = jnp.array([c in _ANGLES and self.layout.kind == "submerged-body" for c in self.layout.channels])
         return jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
+
+
+def memory_states(effects: tuple[AbstractEffect, ...]) -> tuple[str, ...]:
+    """The states that `effects` add to a vehicle's."""
+    return tuple(name for e in effects if isinstance(e, AbstractMemory) for name in e.states)
+
+
+def timed(layout: Layout, signals: Float[Array, "*k m"], like: Signal) -> tuple[list[Signal], Signal]:
+    """The columns of inputs, prescribed motions and surroundings, and the time, zero where `signals` have none."""
+    count = len(layout.held) + len(layout.interpolated)
+    time = signals[..., count] if signals.shape[-1] > count else jnp.zeros_like(like)
+    return [signals[..., i] for i in range(count)], time
 
 
 def stack(named: Mapping[str, Signal], order: tuple[str, ...], like: Signal) -> Float[Array, "*k n"]:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from ..effects import EQUATIONS, GRAVITY, AbstractEffect
 from ..errors import InputError
 from ..parameters import Parameter, number
-from .base import Layout, Output
+from .base import Layout, Output, memory_states
 from .checks import check_coefficients, check_effects, check_names, check_outputs, require_inertia
 from .control import Control
 from .damping import Damping
@@ -65,6 +65,7 @@ def build(
     equations = dof or EQUATIONS
     shown = tuple(output.channel for output in outputs)
     positions = _positions(equations, dict(prescribed), shown) if kind == "submerged-body" else equations
+    positions += memory_states(effects)
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
     layout = Layout(name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes)
     if kind == "mechanism":

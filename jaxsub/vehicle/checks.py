@@ -14,7 +14,7 @@ from .mechanism import Mechanism
 from .schema import unknown_key
 from .submerged_body import SubmergedBody
 
-ENVIRONMENT = ("density", "ballast", "temperature")
+ENVIRONMENT = ("density", "ballast", "temperature", "altitude")
 
 
 def require_inertia(vehicle: SubmergedBody | Mechanism, where: str) -> None:

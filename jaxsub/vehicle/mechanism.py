@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from ..effects import AbstractEffect, Motion, Signal
 from ..parameters import number
-from .base import AbstractVehicle, Layout
+from .base import AbstractVehicle, Layout, timed
 
 
 class Mechanism(AbstractVehicle):
@@ -49,12 +49,14 @@ class Mechanism(AbstractVehicle):
         """Rates and positions by coordinate."""
         equations, n = self.layout.equations, len(self.layout.equations)
         rates: dict[str, Signal] = {e: state[..., i] for i, e in enumerate(equations)}
-        positions: dict[str, Signal] = {e: state[..., n + i] for i, e in enumerate(equations)}
-        columns = [name for name, _ in self.layout.inputs]
+        positions: dict[str, Signal] = {name: state[..., n + i] for i, name in enumerate(self.layout.positions)}
+        columns, time = timed(self.layout, signals, state[..., 0])
+        names = [name for name, _ in self.layout.inputs]
         environment = [name for name, _ in (*self.layout.prescribed, *self.layout.environment)]
-        actuators: dict[str, Signal] = {name: signals[..., i] for i, name in enumerate(columns)}
-        surroundings: dict[str, Signal] = {name: signals[..., len(columns) + i] for i, name in enumerate(environment)}
-        return Motion(rates, positions, actuators, surroundings, self.mass_matrix(), 0.0, 0.0)
+        actuators = dict(zip(names, columns[: len(names)], strict=True))
+        surroundings = dict(zip(environment, columns[len(names) :], strict=True))
+        inertia, damping = self.mass_matrix(), self.damping_matrix()
+        return Motion(rates, positions, actuators, surroundings, inertia, 0.0, 0.0, damping, time)
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
         """Springs, drives and constants."""
@@ -65,13 +67,14 @@ class Mechanism(AbstractVehicle):
             total[e] = self._value(f"F_{e}") - spring + drive
         return total
 
-    def position_rates(self, motion: Motion) -> dict[str, Signal]:
+    def own_position_rates(self, motion: Motion) -> dict[str, Signal]:
         """The rates themselves."""
         return motion.rates
 
     def channels(self, motion: Motion, acceleration: Mapping[str, Signal]) -> dict[str, Signal]:
         """Each coordinate `q` and its rate `q_rate`."""
-        return motion.positions | {f"{name}_rate": rate for name, rate in motion.rates.items()}
+        coordinates = {name: motion.positions[name] for name in self.layout.equations}
+        return coordinates | {f"{name}_rate": rate for name, rate in motion.rates.items()}
 
     def _value(self, name: str) -> Array:
         return self.coefficients.get(name, jnp.zeros(()))

@@ -2,10 +2,11 @@
 
 import dataclasses
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..effects import EQUATIONS, VOCABULARY, AbstractEffect, number_fields, options, parameter_table
+from ..effects import EQUATIONS, AbstractEffect, number_fields, options, parameter_table, vocabulary
 from ..errors import InputError
 from ..parameters import Parameter
 from .build import BODY_KEYS, VECTORS, build
@@ -28,8 +29,8 @@ _TOP = (
 )
 
 
-def read_vehicle(path: str | Path) -> SubmergedBody | Mechanism:
-    """The vehicle in the file at `path`.
+def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ()) -> SubmergedBody | Mechanism:
+    """The vehicle in the file at `path`, which may have `effects` of a user's own besides those of the vocabulary.
 
     **Raises** `InputError` that names the file and the key for anything that is not as formats.md has it.
     """
@@ -42,11 +43,13 @@ def read_vehicle(path: str | Path) -> SubmergedBody | Mechanism:
         raise InputError(str(path), "is not text", "give a vehicle file in TOML, encoded as UTF-8") from error
     except (ValueError, RecursionError) as error:  # a number of 5000 digits and 5000 brackets are no TOMLDecodeError
         raise InputError(str(path), f"is not TOML: {error}", "mend it at that place") from error
-    return vehicle_from(data, str(path))
+    return vehicle_from(data, str(path), effects)
 
 
-def vehicle_from(data: dict[str, Any], where: str) -> SubmergedBody | Mechanism:
-    """The vehicle described by a parsed vehicle file; `where` names it in errors."""
+def vehicle_from(
+    data: dict[str, Any], where: str, effects: Sequence[type[AbstractEffect]] = ()
+) -> SubmergedBody | Mechanism:
+    """The vehicle described by a parsed vehicle file; `where` names it in errors, `effects` are a user's own."""
     top = Table(data, where, "")
     top.only(_TOP)
     if top.required("schema") != 1:
@@ -58,7 +61,8 @@ def vehicle_from(data: dict[str, Any], where: str) -> SubmergedBody | Mechanism:
     numbers = dict(body)
     for name, entry in top.table("coefficients").items():
         numbers[name] = read_number(name, entry, f"{where}: coefficients.{name}", free=True)
-    effects, effect_rows = _read_effects(data.get("effects", []), where)
+    kinds = {kind.name: kind for kind in (*vocabulary(), *effects)}
+    built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
     return build(
         where=where,
         name=str(top.required("name")),
@@ -70,7 +74,7 @@ def vehicle_from(data: dict[str, Any], where: str) -> SubmergedBody | Mechanism:
         prescribed=read_pairs(top.table("prescribed")),
         environment=read_pairs(top.table("environment")),
         outputs=read_outputs(top.table("outputs")),
-        effects=effects,
+        effects=built_in,
         effect_rows=effect_rows,
     )
 
@@ -96,9 +100,10 @@ def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str
     return numbers, hull
 
 
-def _read_effects(entries: Any, where: str) -> tuple[tuple[AbstractEffect, ...], tuple[Parameter, ...]]:
+def _read_effects(
+    entries: Any, where: str, kinds: dict[str, type[AbstractEffect]]
+) -> tuple[tuple[AbstractEffect, ...], tuple[Parameter, ...]]:
     """The `[[effects]]` of a file."""
-    kinds = {kind.name: kind for kind in VOCABULARY}
     effects, rows = [], []
     if not isinstance(entries, list):
         raise InputError(f"{where}: effects", "is not a list of tables", "write [[effects]] above each effect")

@@ -10,12 +10,14 @@ from jaxtyping import Array, Float
 
 from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal
 from ..parameters import number
-from .base import AbstractVehicle, Layout
+from .base import AbstractVehicle, Layout, timed
 from .control import Control
 from .damping import Damping
 from .inertia import Inertia
 from .kinematics import position_rates, specific_force
 from .restoring import Restoring
+
+_POSITIONS = ("phi", "theta", "psi", "x", "y", "z")
 
 
 class SubmergedBody(AbstractVehicle):
@@ -72,7 +74,8 @@ class SubmergedBody(AbstractVehicle):
         """The motion by name: free, prescribed or locked."""
         names = [f"input {n}" for n, _ in self.layout.inputs] + [n for n, _ in self.layout.prescribed]
         names += [f"environment {n}" for n, _ in self.layout.environment]
-        known: dict[str, Signal] = {name: signals[..., i] for i, name in enumerate(names)}
+        columns, time = timed(self.layout, signals, state[..., 0])
+        known: dict[str, Signal] = dict(zip(names, columns, strict=True))
         pick = lambda kind: {n.removeprefix(kind): v for n, v in known.items() if n.startswith(kind)}
         order = [VELOCITIES[e] for e in self.layout.equations] + list(self.layout.positions)
         known |= {name: state[..., i] for i, name in enumerate(order)}
@@ -82,8 +85,9 @@ class SubmergedBody(AbstractVehicle):
             rates["surge"] = zero + self.cruise
         environment = pick("environment ")
         buoyancy = self.restoring.buoyancy(environment)
-        positions = {name: known.get(name, zero) for name in ("phi", "theta", "psi", "x", "y", "z")}
-        return Motion(rates, positions, pick("input "), environment, self.inertia.matrix(), buoyancy, self.cruise)
+        positions = {name: known.get(name, zero) for name in (*_POSITIONS, *self.layout.positions)}
+        inertia, damping = self.inertia.matrix(), self._damping()
+        return Motion(rates, positions, pick("input "), environment, inertia, buoyancy, self.cruise, damping, time)
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
         """Control, restoring, and the damping of prescribed velocities."""
@@ -100,7 +104,7 @@ class SubmergedBody(AbstractVehicle):
             total[equation] += sum(matrix[row, EQUATIONS.index(e)] * motion.rates[e] for e in moved)
         return total
 
-    def position_rates(self, motion: Motion) -> dict[str, Signal]:
+    def own_position_rates(self, motion: Motion) -> dict[str, Signal]:
         """Euler rates and velocity over ground."""
         return position_rates(motion)
 
@@ -109,7 +113,7 @@ class SubmergedBody(AbstractVehicle):
         velocities = {VELOCITIES[e]: motion.rates[e] for e in EQUATIONS}
         rates = position_rates(motion)
         u, v, w = velocities["u"], velocities["v"], velocities["w"]
-        found = velocities | motion.positions
+        found = velocities | {name: motion.positions[name] for name in _POSITIONS}
         found |= {"depth": motion.positions["z"], "depth_rate": rates["z"], "heading_rate": rates["psi"]}
         found["speed"] = jnp.sqrt(u**2 + v**2 + w**2 + 1e-12)
         for output in self.layout.outputs if acceleration else ():

@@ -1,0 +1,124 @@
+"""Actuator effects without a memory: what a deflection is of the command at the same time."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..parameters import number
+from .actuators import PARTS
+from .base import AbstractActuator, amplitude, shape
+from .motion import Facts
+
+
+def _largest(facts: Facts) -> dict[str, float]:
+    """The largest command of each actuator that moved."""
+    sizes = {name: facts.input_range[name][1] for name in facts.actuators if name in facts.input_range}
+    return {name: size for name, size in sizes.items() if size > 0.0}
+
+
+class ActuatorSaturation(AbstractActuator):
+    r"""A stop: $|\delta| \le \delta_{max}$, $\delta_{max} > 0$ in the actuator's unit. Source: Fossen (2021), §9.5."""
+
+    name: ClassVar[str] = "actuator-saturation"
+    family: ClassVar[str] = "actuators"
+    actuator: str = eqx.field(static=True)
+    limit: Array = shape("1", sign=+1, default=1.0)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[ActuatorSaturation]":
+        """Each actuator with limits from half to nine tenths of its largest command."""
+        parts = (0.5, 0.6, 0.7, 0.8, 0.9)
+        return [cls(name, number(part * size)) for name, size in _largest(facts).items() for part in parts]
+
+    @property
+    def expression(self) -> str:
+        """The limit."""
+        return f"|{self.actuator}| <= limit"
+
+    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+        """The limited deflection."""
+        return jnp.clip(nodes, -self.limit, self.limit)
+
+
+class ActuatorDeadband(AbstractActuator):
+    r"""A command too small to move anything is lost: $\delta = \mathrm{sign}(\delta_{cmd})\max(|\delta_{cmd}| - d, 0)$.
+
+    $d > 0$ in the actuator's unit.
+
+    Source: Tao and Kokotovic (1996), §2.
+    """
+
+    name: ClassVar[str] = "actuator-deadband"
+    family: ClassVar[str] = "actuators"
+    actuator: str = eqx.field(static=True)
+    d: Array = shape("1", sign=+1, default=0.01)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[ActuatorDeadband]":
+        """Each actuator with bands of a few to forty per cent of its largest command."""
+        return [cls(name, number(part * size)) for name, size in _largest(facts).items() for part in PARTS]
+
+    @property
+    def expression(self) -> str:
+        """The band."""
+        return f"{self.actuator} = sign(command) max(|command| - d, 0)"
+
+    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+        """What is left of the command."""
+        return nodes - jnp.clip(nodes, -self.d, self.d)
+
+
+class ActuatorMisalignment(AbstractActuator):
+    r"""A control surface that is mounted or zeroed askew: $\delta = \delta_{cmd} + b$ in rad, of either sign.
+
+    Source: Fossen (2021), §9.4; a constant force of the fin, so a rival of an asymmetric hull.
+    """
+
+    name: ClassVar[str] = "actuator-misalignment"
+    family: ClassVar[str] = "actuators"
+    actuator: str = eqx.field(static=True)
+    b: Array = amplitude("rad")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[ActuatorMisalignment]":
+        """Each control surface of a body."""
+        return [cls(name) for name in facts.fins]
+
+    @property
+    def expression(self) -> str:
+        """The offset."""
+        return f"{self.actuator} = command + b"
+
+    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+        """The offset deflection."""
+        return nodes + self.b
+
+
+class ControlSurfaceStall(AbstractActuator):
+    r"""A fin whose lift falls off at large deflections: it acts as one of $\delta - k\delta^3$, $k \ge 0$ in 1/rad².
+
+    The first term of a lift curve that bends over; the inflow angle of the hull is left out.
+    Source: Whicker and Fehlner (1958), DTMB 933; Abkowitz (1964), $Y_{\delta\delta\delta}$.
+    """
+
+    name: ClassVar[str] = "control-surface-stall"
+    family: ClassVar[str] = "actuators"
+    actuator: str = eqx.field(static=True)
+    k: Array = amplitude("1/rad/rad", sign=+1)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[ControlSurfaceStall]":
+        """Each control surface of a body."""
+        return [cls(name) for name in facts.fins]
+
+    @property
+    def expression(self) -> str:
+        """The bent lift curve."""
+        return f"{self.actuator} acts as command - k command³"
+
+    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+        """The deflection that would have the same lift without stall."""
+        return nodes - self.k * nodes**3

@@ -1,0 +1,103 @@
+"""The water that moves: currents and waves."""
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from ..parameters import number
+from .base import AbstractForce, amplitude, shape
+from .motion import EQUATIONS, FORCES, Facts, Motion, Signal, unit_per
+
+
+class Current(AbstractForce):
+    r"""A steady horizontal current $V_N, V_E$ (m/s, over ground, of either sign), where velocities are over ground.
+
+    In body axes $v_c = R(\phi,\theta,\psi)^T[V_N\,V_E\,0]$, and linear damping feels the water and not the ground:
+    $\tau = -A\,[v_c\,0]$ with the linear derivatives by u, v and w. What grows with the square of the velocity, and the
+    added mass of water that turns past the body, are left out. Source: Fossen (2021), §10.3.
+    """
+
+    name: ClassVar[str] = "current"
+    family: ClassVar[str] = "environment"
+    equations: tuple[str, ...] = eqx.field(static=True)
+    V_N: Array = amplitude("m/s")
+    V_E: Array = amplitude("m/s")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[Current]":
+        """One, for a body that turns: to one that does not, it is a constant force."""
+        return [cls(facts.equations)] if facts.kind == "submerged-body" and "yaw" in facts.equations else []
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """Every free equation, those across the hull first."""
+        order = ("sway", "yaw", "heave", "pitch", "surge", "roll")
+        return tuple(e for e in order if e in self.equations)
+
+    @property
+    def expression(self) -> str:
+        """The force."""
+        return "-A Rᵀ [V_N, V_E, 0]"
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """What the damping of the water's own velocity takes away."""
+        phi, theta, psi = (motion.positions[name] for name in ("phi", "theta", "psi"))
+        ahead = self.V_N * jnp.cos(psi) + self.V_E * jnp.sin(psi)
+        across = self.V_E * jnp.cos(psi) - self.V_N * jnp.sin(psi)
+        u = ahead * jnp.cos(theta)
+        v = ahead * jnp.sin(theta) * jnp.sin(phi) + across * jnp.cos(phi)
+        w = ahead * jnp.sin(theta) * jnp.cos(phi) - across * jnp.sin(phi)
+        rows = {e: motion.damping[EQUATIONS.index(e)] for e in self.equations}
+        return {e: -(row[0] * u + row[1] * v + row[2] * w) for e, row in rows.items()}
+
+
+class WaveForcing(AbstractForce):
+    r"""A regular wave in one equation: $\tau_i = a\cos\omega t + b\sin\omega t$.
+
+    $\omega > 0$ is the frequency of encounter, rad/s. The time is each run's own, so runs in one sea need amplitudes of
+    their own: fit them one by one.
+    Source: Fossen (2021), §10.2; Faltinsen (1990).
+    """
+
+    name: ClassVar[str] = "wave-forcing"
+    family: ClassVar[str] = "environment"
+    equation: str = eqx.field(static=True)
+    a: Array = amplitude("1")
+    b: Array = amplitude("1")
+    omega: Array = shape("rad/s", sign=+1, default=1.0)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[WaveForcing]":
+        """Each free equation of a body, from two periods in the longest run to four samples in a period."""
+        slowest, fastest = 4.0 * np.pi / max(facts.duration, 1e-9), 0.5 * np.pi / facts.sample_interval
+        if facts.kind != "submerged-body" or facts.duration <= 0.0 or slowest >= fastest:
+            return []
+        grid = np.geomspace(slowest, fastest, 24).tolist()
+        return [cls(e, omega=number(w)) for e in facts.equations for w in grid]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.equation,)
+
+    def symbols(self) -> dict[str, str]:
+        """`Y_cos`, `Y_sin` and `omega`."""
+        return {"a": f"{FORCES[self.equation]}_cos", "b": f"{FORCES[self.equation]}_sin", "omega": "omega"}
+
+    def units(self) -> dict[str, str]:
+        """A force or a moment, and a frequency."""
+        return {"a": unit_per(self.equation), "b": unit_per(self.equation), "omega": "rad/s"}
+
+    @property
+    def expression(self) -> str:
+        """The wave."""
+        return f"{FORCES[self.equation]}_cos cos(ωt) + {FORCES[self.equation]}_sin sin(ωt)"
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """The wave along the run."""
+        angle = self.omega * motion.time + 0.0 * motion.rates[self.equation]
+        return {self.equation: self.a * jnp.cos(angle) + self.b * jnp.sin(angle)}

@@ -1,0 +1,105 @@
+"""Sensor effects that are not linear in the output: late, cut off, or without its sign."""
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..parameters import number
+from .base import AbstractSensor, amplitude, shape
+from .motion import Facts, Motion, Signal
+
+# channels that have one sign by nature
+_ONE_SIGN = ("speed", "depth", "z", "x", "y", "u")
+
+
+class SensorDelay(AbstractSensor):
+    r"""A late reading: $z(t) = y(t - \tau)$, $\tau \ge 0$ in s, by linear interpolation between the samples.
+
+    Before the run y is taken to be its first sample. Source: Ljung (1999), §4.2.
+    """
+
+    name: ClassVar[str] = "sensor-delay"
+    family: ClassVar[str] = "sensors"
+    remembers: ClassVar[bool] = True
+    channel: str = eqx.field(static=True)
+    tau: Array = shape("s", sign=+1, default=0.1)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SensorDelay]":
+        """Each channel with delays from half a sample up."""
+        grid = [n * facts.sample_interval for n in (0.5, 1.0, 2.0, 4.0, 8.0)]
+        return [cls(channel, number(tau)) for channel in facts.channels for tau in grid]
+
+    @property
+    def expression(self) -> str:
+        """The delay."""
+        return f"{self.channel} measured(t) = {self.channel}(t - τ)"
+
+    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+        """The output a while ago."""
+        late = jnp.vectorize(jnp.interp, signature="(k),(k),(k)->(k)")
+        return late(times - jnp.maximum(self.tau, 0.0), times, jnp.asarray(outputs[self.channel]))
+
+    def undone(self, times: Float[Array, " *k"], recorded: Float[Array, " *k"]) -> Float[Array, " *k"]:
+        """What was shown a while later."""
+        return jnp.interp(times + jnp.maximum(self.tau, 0.0), times, recorded)
+
+
+class SensorSaturation(AbstractSensor):
+    r"""A sensor at the end of its range: $z = \min(\max(y, -l), l)$, $l > 0$ in the channel's unit.
+
+    Source: Titterton and Weston (2004), §4.
+    """
+
+    name: ClassVar[str] = "sensor-saturation"
+    family: ClassVar[str] = "sensors"
+    channel: str = eqx.field(static=True)
+    limit: Array = shape("1", sign=+1, default=1.0)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SensorSaturation]":
+        """Each channel with a limit at or a little below the largest that it showed, which noise may exceed."""
+        shown = {c: max(map(abs, facts.output_range[c])) for c in facts.channels if c in facts.output_range}
+        return [
+            cls(c, number(part * size)) for c, size in shown.items() if size > 0.0 for part in (0.8, 0.9, 0.95, 1.0)
+        ]
+
+    @property
+    def expression(self) -> str:
+        """The limit."""
+        return f"|{self.channel} measured| <= limit"
+
+    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+        """The output within the limit."""
+        return jnp.clip(jnp.asarray(outputs[self.channel]), -self.limit, self.limit)
+
+
+class SensorRectification(AbstractSensor):
+    r"""A sensor that loses the sign: $z = y + f(|y| - y)$, $0 \le f \le 1$; a full rectifier has f = 1.
+
+    Source: Horowitz and Hill (2015), §4.3; the Silverbox's and like rigs' detectors.
+    """
+
+    name: ClassVar[str] = "sensor-rectification"
+    family: ClassVar[str] = "sensors"
+    channel: str = eqx.field(static=True)
+    f: Array = amplitude("1", sign=+1)
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SensorRectification]":
+        """Each channel that may be negative and, noise apart, never was."""
+        signed = [c for c in facts.channels if c in facts.output_range and c not in _ONE_SIGN]
+        return [cls(c) for c in signed if facts.output_range[c][0] > -0.05 * facts.output_range[c][1]]
+
+    @property
+    def expression(self) -> str:
+        """The lost sign."""
+        return f"{self.channel} measured = {self.channel} + f (|{self.channel}| - {self.channel})"
+
+    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+        """The rectified output."""
+        true = jnp.asarray(outputs[self.channel])
+        return true + self.f * (jnp.abs(true) - true)

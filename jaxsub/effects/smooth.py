@@ -1,0 +1,70 @@
+"""A force that follows one variable smoothly: what is left to say where nothing in the vocabulary fits."""
+
+import functools
+import operator
+from collections.abc import Sequence
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from .base import AbstractForce, amplitude
+from .motion import FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
+
+KNOTS = 8
+
+
+class SmoothForce(AbstractForce):
+    r"""A force that is a piecewise line in one variable: $\tau_i = \sum_j a_j\,\Lambda_j(x)$.
+
+    $\Lambda_j$ are hats at `KNOTS` equidistant places from `low` to `high`; beyond them the force stays what it is at
+    the end. It describes and does not explain: it is no candidate, and joins a model whose mismatch has no name.
+    """
+
+    name: ClassVar[str] = "smooth-force"
+    family: ClassVar[str] = "description"
+    equation: str = eqx.field(static=True)
+    variable: str = eqx.field(static=True)
+    low: float = eqx.field(static=True)
+    high: float = eqx.field(static=True)
+    a_0: Array = amplitude("1")
+    a_1: Array = amplitude("1")
+    a_2: Array = amplitude("1")
+    a_3: Array = amplitude("1")
+    a_4: Array = amplitude("1")
+    a_5: Array = amplitude("1")
+    a_6: Array = amplitude("1")
+    a_7: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SmoothForce]":
+        """None: it is not a name for anything."""
+        return []
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.equation,)
+
+    def units(self) -> dict[str, str]:
+        """A force or a moment."""
+        return dict.fromkeys((f"a_{j}" for j in range(KNOTS)), unit_per(self.equation))
+
+    @property
+    def expression(self) -> str:
+        """That it depends on the variable."""
+        return f"{FORCES.get(self.equation, 'F')}({self.variable}), by interpolation"
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """The force along the motion."""
+        x = variables(motion)[self.variable]
+        place = jnp.clip((x - self.low) / (self.high - self.low), 0.0, 1.0) * (KNOTS - 1)
+        parts = [getattr(self, f"a_{j}") * jnp.maximum(0.0, 1.0 - abs(place - j)) for j in range(KNOTS)]
+        return {self.equation: functools.reduce(operator.add, parts)}
+
+
+def variables(motion: Motion) -> dict[str, Signal]:
+    """What a force may follow, by the name that its user knows: velocities, positions, actuators, surroundings."""
+    rates: dict[str, Signal] = {VELOCITIES.get(e, f"{e}_rate"): rate for e, rate in motion.rates.items()}
+    return rates | motion.positions | motion.actuators | motion.environment

@@ -1,0 +1,120 @@
+"""A vehicle with any effect of the vocabulary is written and read back the same, and answers the same and finitely."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from rigs import coupled, driven, stacked
+
+from jaxsub.effects import (
+    VOCABULARY,
+    AbstractMemory,
+    Facts,
+    WaveForcing,
+    candidates,
+    with_numbers,
+)
+from jaxsub.simulate import at_rest, simulate
+from jaxsub.vehicle import read_vehicle, vehicle_from, vehicle_text, write_vehicle
+
+# one over what is a usual size, where others are of the order of a hundredth
+SMALL = {"hull-compressibility": 3e9, "thermal-expansion": 3e4, "density-stratification": 3e4}
+
+
+def body():
+    """Six degrees of freedom with every actuator, an altitude and sensors of every kind."""
+    damping = {"X_u": -15.0, "Y_v": -80.0, "Z_w": -80.0, "K_p": -8.0, "M_q": -30.0, "N_r": -30.0, "N_v": -10.0}
+    added = {"X_udot": -5.0, "Y_vdot": -60.0, "Z_wdot": -60.0, "M_qdot": -20.0, "N_rdot": -20.0}
+    fins = {"Y_delta_r": 20.0, "N_delta_r": -15.0, "Z_delta_e": -20.0, "M_delta_e": -15.0}
+    channels = ("u", "v", "r", "q", "phi", "theta", "psi", "depth", "ax", "az", "y")
+    return vehicle_from(
+        {
+            "schema": 1, "name": "body", "kind": "submerged-body",
+            "body": {"mass": 60.0, "inertia": [1.0, 12.0, 12.0], "speed": 1.5, "centre_of_buoyancy": [0.0, 0.0, -0.02]},
+            "coefficients": damping | added | fins,
+            "inputs": {"rudder": "dr", "elevator": "de", "thrust": "T"},
+            "environment": {"altitude": "h", "temperature": "C"},
+            "outputs": {channel: {"sigma": 0.01} for channel in channels},
+        },
+        "body.toml",
+    )  # fmt: skip
+
+
+def facts(vehicle):
+    layout = vehicle.layout
+    every = lambda names, value: dict.fromkeys(names, value)
+    inputs = tuple(name for name, _ in layout.inputs)
+    coordinates = every(layout.equations, 0.2) if layout.kind == "mechanism" else {}
+    return Facts(
+        layout.kind, layout.equations, inputs, layout.channels, tuple(name for name, _ in layout.environment),
+        layout.length, layout.diameter, every(layout.equations, 0.3), 0.1, 2.0, coordinates,
+        every(inputs, (0.1, 0.2, 1.0)), every(layout.channels, (0.0, 0.2)), (0.0, 2.0),
+    )  # fmt: skip
+
+
+def chosen(vehicle):
+    """One effect of each kind that fits the vehicle, every number other than its default and of the sign of physics."""
+    first = {}
+    for effect in candidates(facts(vehicle)):
+        first.setdefault(type(effect), effect)
+    size = lambda effect, i, sign: (sign or 1) * (i + 1.0) / SMALL.get(effect.name, 37.0)
+    sizes = lambda effect: {name: size(effect, i, sign) for i, (name, sign) in enumerate(effect.signs().items())}
+    return [with_numbers(effect, sizes(effect)) for effect in first.values()]
+
+
+BODY, RIG = body(), coupled()
+
+
+def test_every_effect_is_tried_here():
+    assert {type(effect) for vehicle in (BODY, RIG) for effect in chosen(vehicle)} == set(VOCABULARY)
+
+
+@pytest.mark.parametrize("plain", [BODY, RIG], ids=lambda vehicle: vehicle.layout.name)
+def test_a_vehicle_with_every_effect_reads_back_the_same_and_answers_the_same(plain, tmp_path):
+    vehicle = plain
+    for effect in chosen(plain):
+        vehicle = vehicle.with_effect(effect)
+    write_vehicle(vehicle, tmp_path / "vehicle.toml")
+    again = read_vehicle(tmp_path / "vehicle.toml")
+    assert vehicle_text(again) == vehicle_text(vehicle)
+    assert {n: float(v) for n, v in again.values().items()} == {n: float(v) for n, v in vehicle.values().items()}
+    assert again.layout.positions == vehicle.layout.positions
+    bare = lambda v: dataclasses.replace(v.layout, parameters=())
+    assert bare(again) == bare(vehicle)
+    runs = stacked(vehicle, [driven(vehicle, 0.1 * np.arange(12), seed=1, hold=3)])
+    one, two, without = (simulate(v, runs, at_rest(v, 1)) for v in (vehicle, again, plain))
+    assert np.isfinite(one).all()
+    assert np.abs(one - without).max() > 0.01
+    np.testing.assert_array_equal(one, two)
+
+
+def test_an_effect_that_is_taken_away_leaves_the_vehicle_as_it_was():
+    vehicle = BODY
+    for effect in chosen(BODY):
+        vehicle = vehicle.with_effect(effect)
+    states = [state for e in vehicle.effects if isinstance(e, AbstractMemory) for state in e.states]
+    assert states
+    assert vehicle.layout.positions == (*BODY.layout.positions, *states)
+    for effect in chosen(BODY):
+        vehicle = vehicle.without_effect(effect.label)
+    assert vehicle.layout == BODY.layout
+
+
+def test_a_wave_keeps_its_phase_between_samples_and_in_pieces_of_a_run():
+    """Heave alone under a wave is m ż̈ + d ż = a cos ωt, whose solution is known; halves of a run go on in time."""
+    plain = vehicle_from(
+        {"schema": 1, "name": "float", "kind": "submerged-body", "dof": ["heave"], "body": {"mass": 2.0},
+         "coefficients": {"Z_w": -3.0}, "outputs": {"w": {"sigma": 0.01}}}, "float.toml",
+    )  # fmt: skip
+    wave = WaveForcing("heave", jnp.asarray(1.4), jnp.asarray(-0.6), jnp.asarray(1.9))
+    vehicle, times = plain.with_effect(wave), 0.05 * np.arange(81)
+    runs = stacked(vehicle, [driven(vehicle, times, seed=1)])
+    found = np.asarray(simulate(vehicle, runs, at_rest(vehicle, 1)))[0, :, 0]
+    steady = (1.4 + 0.6j) / (2.0 * 1.9j + 3.0)
+    expected = np.real(steady * np.exp(1.9j * times)) - np.real(steady) * np.exp(-1.5 * times)
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    halves = runs.segments(2)
+    start = at_rest(vehicle, 2).at[1, 0].set(expected[40])
+    second = np.asarray(simulate(vehicle, halves, start))[1, :, 0]
+    np.testing.assert_allclose(second, expected[40:], atol=1e-6)
