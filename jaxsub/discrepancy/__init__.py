@@ -1,6 +1,7 @@
 """The heart: locate the mismatch, name what was left out, model it, show that it helps."""
 
-from .diagnose import batch, diagnose
+from .batch import batch
+from .diagnose import diagnose
 from .diagnosis import Diagnosis
 
 __all__ = ["Diagnosis", "batch", "diagnose"]

@@ -1,110 +1,113 @@
-"""What each candidate effect would add to the outputs, per unit of its amplitude, along the fitted trajectory."""
+"""What each candidate effect adds to the next sample, per unit of its amplitude, along the motion that took place."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from ..effects import (
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
+    AbstractMemory,
     AbstractSensor,
-    Facts,
     Motion,
     amplitudes,
+    numbers,
+    with_memory,
     with_numbers,
 )
-from ..estimate import Fit
-from ..likelihood import force_columns
-from ..recording.runs import Runs
+from ..likelihood import Columns
 from ..vehicle import AbstractVehicle
+from .view import Trajectory, View
+
+# by how much a shape such as a lag is moved to see which way the data would have it
+_NUDGE = 0.1
 
 
-class Trajectory(eqx.Module):
-    """The fitted motion at both ends of every sample interval, as NumPy arrays: what effects are evaluated on.
+@dataclasses.dataclass(frozen=True)
+class Pieces:
+    """An effect's columns before they meet the model.
 
-    NumPy on purpose: a force is a handful of array operations, so a vocabulary of any size costs no compilation.
+    **Fields**
+
+    - `forces`: generalised forces at both ends of each interval, (2, R, K-1, n) a column.
+    - `outputs`: changes of the channels, (R, K, c) a column, SI. One of the two is empty.
     """
 
-    start: Motion
-    end: Motion
-    nodes: np.ndarray
-    outputs: np.ndarray
-
-    @classmethod
-    def of(cls, fit: Fit) -> "Trajectory":
-        """The trajectory of a fit."""
-        vehicle, runs, states = fit.vehicle, fit.runs, fit.model.states
-        nodes, outputs, start, end = _trajectory(vehicle, runs, states)
-        plain = lambda tree: jax.tree.map(np.asarray, tree)
-        return cls(plain(start), plain(end), np.asarray(nodes), np.asarray(outputs))
+    forces: list[np.ndarray]
+    outputs: list[np.ndarray]
 
 
-@eqx.filter_jit
-def _trajectory(vehicle: AbstractVehicle, runs: Runs, states: Array) -> tuple[Array, Array, Motion, Motion]:
-    nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
-    start = vehicle.motion(states[:, :-1], nodes[:, :, 0])
-    end = vehicle.motion(states[:, 1:], nodes[:, :, 2])
-    return nodes, vehicle.measure(runs.times, states, runs.signals), start, end
+def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple[Columns, list[list[int]]]:
+    """The columns of all candidates, and which of them each candidate has.
 
-
-def facts(vehicle: AbstractVehicle, fit: Fit) -> Facts:
-    """What the vocabulary needs to know to list its candidates."""
-    layout = vehicle.layout
-    n = len(layout.equations)
-    scale = np.sqrt(np.mean(np.asarray(fit.model.states[..., :n]) ** 2, axis=(0, 1)))
-    return Facts(
-        layout.kind,
-        layout.equations,
-        tuple(name for name, _ in layout.inputs),
-        layout.channels,
-        tuple(name for name, _ in layout.environment),
-        layout.length,
-        layout.diameter,
-        dict(zip(layout.equations, np.maximum(scale, 1e-9).tolist(), strict=True)),
-        float(np.median(np.asarray(fit.runs.steps)[np.asarray(fit.runs.step_of)[np.asarray(fit.runs.live)]])),
-    )
-
-
-def candidate_columns(
-    fit: Fit, path: Trajectory, candidates: Sequence[AbstractEffect]
-) -> tuple[Float[Array, "r k c q"], list[int]]:
-    """Output change per unit of each amplitude of each candidate (SI), and which candidate each column belongs to.
-
-    A force is evaluated along the stored trajectory and pushed through the model's linear recursion; an effect with no
-    amplitude, such as a lag, enters as the whole difference that it makes at its grid value.
+    An effect with amplitudes has a column for each. One with none, such as a lag, enters as the whole difference that
+    it makes at its grid value, and the difference that a little more of it would make.
     """
-    owners, forces, shown = [], [], []
-    order = [i for i, e in enumerate(candidates) if not isinstance(e, AbstractSensor)]
-    for i in order:
-        for column in unit_forces(fit.vehicle, path, fit, candidates[i]):
-            owners.append(i)
-            forces.append(column)
-    for i, effect in enumerate(candidates):
-        if isinstance(effect, AbstractSensor):
-            owners.append(i)
-            shown.append(_unit_sensor(fit, path, effect))
-    parts = []
-    if forces:
-        ends = np.stack(forces, axis=-1)  # (2, r, k-1, n, q)
-        parts.append(force_columns(fit.model, jnp.asarray(ends[0]), jnp.asarray(ends[1])))
-    if shown:
-        parts.append(jnp.asarray(np.stack(shown, axis=-1)))
-    return jnp.concatenate(parts, axis=-1), owners
+    pieces = [_pieces(view, effect) for effect in candidates]
+    forces = [column for piece in pieces for column in piece.forces]
+    outputs = [column for piece in pieces for column in piece.outputs]
+    owners, pushed, seen = [], 0, len(forces)
+    for piece in pieces:
+        first = pushed if piece.forces else seen
+        count = len(piece.forces) + len(piece.outputs)
+        owners.append(list(range(first, first + count)))
+        pushed, seen = pushed + len(piece.forces), seen + len(piece.outputs)
+    return force_columns(view, forces) + output_columns(view, outputs), owners
 
 
-def unit_forces(vehicle: AbstractVehicle, path: Trajectory, fit: Fit, effect: AbstractEffect) -> list[np.ndarray]:
-    """The generalised force per unit of each amplitude at both ends of each interval: arrays (2, R, K-1, n)."""
-    if isinstance(effect, AbstractActuator):
-        return [_actuator_force(vehicle, path, fit, effect)]
-    assert isinstance(effect, AbstractForce)
+def force_columns(view: View, forces: Sequence[np.ndarray]) -> Columns:
+    """Columns of generalised forces given at both ends of each interval, (2, R, K-1, n) each."""
+    system = view.followed.system
+    if not forces:
+        return Columns(jnp.zeros((*system.C.shape[:3], 0)), jnp.zeros((*system.A.shape[:3], 0)))
+    ends = jnp.asarray(np.stack(forces, axis=-1))
+    forcing = system.G @ jnp.concatenate([ends[0], ends[1]], axis=2)
+    return Columns(jnp.zeros((*system.C.shape[:3], len(forces))), forcing)
+
+
+def output_columns(view: View, outputs: Sequence[np.ndarray]) -> Columns:
+    """Columns of changes of the channels, (R, K, c) each, SI."""
+    system = view.followed.system
+    if not outputs:
+        return force_columns(view, [])
+    shown = jnp.asarray(np.stack(outputs, axis=-1)) / view.sigma[:, None]
+    shown = jnp.where(system.measured[..., None], shown, 0.0)
+    return Columns(shown, jnp.zeros((*system.A.shape[:3], len(outputs))))
+
+
+def _pieces(view: View, effect: AbstractEffect) -> Pieces:
     names = amplitudes(effect)
-    units = [with_numbers(effect, {name: float(name == own) for name in names}) for own in names]
-    return [np.stack([stacked_force(vehicle, unit, motion) for motion in (path.start, path.end)]) for unit in units]
+    if names:
+        units = [with_numbers(effect, {name: float(name == own) for name in names}) for own in names]
+        whole = [difference(view, unit) for unit in units]
+    else:
+        at = difference(view, effect)
+        more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
+        whole = [at, (difference(view, with_numbers(effect, more)) - at) / _NUDGE]
+    return Pieces([], whole) if isinstance(effect, AbstractSensor) else Pieces(whole, [])
+
+
+def difference(view: View, effect: AbstractEffect) -> np.ndarray:
+    """What an effect as it stands adds: a force (2, R, K-1, n), or to the channels (R, K, c)."""
+    vehicle, path = view.vehicle, view.path
+    if isinstance(effect, AbstractActuator):
+        return actuator_force(vehicle, path, effect)
+    if isinstance(effect, AbstractForce):
+        ends = (path.start, path.end)
+        if isinstance(effect, AbstractMemory):
+            ends = with_memory(effect, *ends, path.steps)
+        return np.stack([stacked_force(vehicle, effect, motion) for motion in ends])
+    assert isinstance(effect, AbstractSensor)
+    channels = vehicle.layout.channels
+    change = np.zeros((*path.times.shape, len(channels)))
+    change[..., channels.index(effect.channel)] = sensor_change(path, effect)
+    return change
 
 
 def stacked_force(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motion) -> np.ndarray:
@@ -115,11 +118,12 @@ def stacked_force(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motio
     return np.stack([np.broadcast_to(parts.get(e, 0.0), like.shape) for e in vehicle.layout.equations], axis=-1)
 
 
-def _actuator_force(vehicle: AbstractVehicle, path: Trajectory, fit: Fit, effect: AbstractActuator) -> np.ndarray:
+def actuator_force(vehicle: AbstractVehicle, path: Trajectory, effect: AbstractActuator) -> np.ndarray:
     """The force that a changed actuator adds, as the line over each interval with the same mean and slope."""
     column = [name for name, _ in vehicle.layout.inputs].index(effect.actuator)
-    before = path.nodes[..., column]
-    after = np.asarray(_respond(effect, fit.runs.times, jnp.asarray(before)))
+    # which actuator it is makes no difference to how it responds, and would make one to the compiler
+    nameless = dataclasses.replace(effect, actuator="")
+    after = np.asarray(_respond(nameless, jnp.asarray(path.times), jnp.asarray(path.nodes[..., column])))
     start, middle, end = np.moveaxis(after, -1, 0)
     mean, slope = (start + 4.0 * middle + end) / 6.0, end - start
     ends = []
@@ -139,17 +143,6 @@ def _respond(effect: AbstractActuator, times: Array, nodes: Array) -> Array:
     return jax.vmap(effect.respond)(times, nodes)
 
 
-def _unit_sensor(fit: Fit, path: Trajectory, effect: AbstractSensor) -> np.ndarray:
-    """The change of the outputs per unit of a sensor effect's amplitude, (R, K, c)."""
-    (name,) = amplitudes(effect)
-    column = np.zeros_like(path.outputs)
-    column[..., fit.vehicle.layout.channels.index(effect.channel)] = sensor_change(
-        fit, path, with_numbers(effect, {name: 1.0})
-    )[0]
-    return column
-
-
-def sensor_change(fit: Fit, path: Trajectory, effect: AbstractSensor) -> tuple[np.ndarray, np.ndarray]:
-    """What a sensor effect changes in its channel, and the channel without it, (R, K) each."""
-    true = path.outputs[..., fit.vehicle.layout.channels.index(effect.channel)]
-    return np.asarray(effect.measure(fit.runs.times, jnp.asarray(true))) - true, true
+def sensor_change(path: Trajectory, effect: AbstractSensor) -> np.ndarray:
+    """What a sensor effect changes in its channel, (R, K)."""
+    return np.asarray(effect.measure(jnp.asarray(path.times), path.true, path.seen)) - path.true[effect.channel]

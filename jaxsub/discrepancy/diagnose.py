@@ -4,37 +4,37 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Array
 
-from ..effects import VOCABULARY, AbstractEffect, candidates
+from ..effects import AbstractEffect, candidates
 from ..errors import InputError
 from ..estimate import Fit, fit
+from ..likelihood import Disturbance
 from ..recording import Recording
-from ..recording.runs import Runs, stack_runs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .advice import next_manoeuvre
-from .columns import Trajectory, facts
-from .diagnosis import Diagnosis, Location, Physics, Rival, Verdict
-from .locate import Field, effect_share, locate, locations
-from .name import Naming, Step, certain, name
+from .batch import batch
+from .columns import candidate_columns
+from .diagnosis import Diagnosis, Location, Physics, Rival
+from .evidence import Evidence
+from .generic import Pattern, pattern
+from .locate import Field, effect_shares, locations, shares, traces
+from .model import join, settle
+from .name import Named, Naming, Selector, name
 from .process_noise import noise_note, noise_signals
-from .refit import SIGNIFICANCE, Progress
-from .show import HeldOut, channel_quality, coefficients, estimates, hold, overlays, record_sigma, run_quality
-from .whiteness import whiteness_p_value
-
-EXPLAINED = 0.75
-_TWIN = 0.01
+from .progress import Progress
+from .show import channel_quality, coefficients, estimates, hold, luck, overlays, run_quality
+from .verdict import Judged, helped, judge, summary
+from .view import View, facts, look
 
 
 @dataclasses.dataclass(frozen=True)
-class Judged:
-    """A verdict, the steps that stand, the mismatch's p-value, and what a reader must know."""
+class Found:
+    """What the vocabulary and an anonymous force say about the recordings from one view of them."""
 
-    verdict: Verdict
-    steps: list[Step]
-    p_value: float
-    notes: list[str]
+    view: View
+    naming: Naming
+    pattern: Pattern | None
 
 
 def diagnose(
@@ -42,38 +42,49 @@ def diagnose(
     train: Sequence[Recording],
     held: Sequence[Recording],
     *,
-    vocabulary: tuple[type[AbstractEffect], ...] = VOCABULARY,
+    vocabulary: tuple[type[AbstractEffect], ...] | None = None,
     progress: Progress = lambda message: None,
 ) -> tuple[Diagnosis, AbstractVehicle]:
     """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `held`.
 
-    Returns the diagnosis and the improved vehicle; `progress` is told what is being done. **Raises** `InputError`
-    where the recordings lack a column, or the model does not run from the vehicle file's values.
+    Returns the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` is told
+    what is being done. **Raises** `InputError` where the recordings lack a column, or the model does not run from the
+    vehicle file's values.
     """
-    layout = vehicle.layout
+    layout, size = vehicle.layout, len(train)
     runs = batch(vehicle, [*train, *held])
-    seen, size = runs.take(range(len(train)), len(train)), len(train)
+    seen, chosen = runs.take(range(size), size), range(size, size + len(held))
     progress("fitting the baseline")
-    baseline = fit(vehicle, seen)
-    if bool(baseline.result == RESULTS.nan_start):
+    start = fit(vehicle, seen)
+    if bool(start.result == RESULTS.nan_start):
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
         raise InputError(layout.name, "the model does not run from its starting values", remedy)
-    path = Trajectory.of(baseline)
-    progress("locating the mismatch")
-    signals = noise_signals(baseline, train)
-    field = locate(baseline, path, train, signals)
-    naming = name(baseline, vehicle, lambda found: candidates(facts(vehicle, found), vocabulary), progress)
+    progress("following the recordings")
+    found = examine(look(start), vocabulary, progress)
+    view, naming = found.view, found.naming
+    signals = noise_signals(start, train)
+    share = shares(view, naming.first, candidates(facts(view), vocabulary))
+    field = Field(share, traces(view, train), signals)
     progress("free runs through what the fit did not see")
-    chosen = range(size, size + len(held))
-    sigma = (naming.steps[-1].fit if naming.steps else baseline).sigma
-    models = [baseline, *(step.fit for step in naming.steps)]
-    held_out = [hold(model.vehicle, runs, chosen, size, sigma) for model in models]
-    judged = judge(baseline, naming, held_out)
-    before, improved, after = held_out[0], models[len(judged.steps)], held_out[len(judged.steps)]
-    remaining = locate(improved, Trajectory.of(improved), train).traces if judged.steps else field.traces
-    where = _where(judged, baseline, path, field, train)
-    physics = [_physics(step, improved) for step in judged.steps]
-    before_train = channel_scaled(baseline, sigma)
+    held_out = lambda model, disturbance: hold(model.vehicle, runs, chosen, size, start.sigma, disturbance)
+    baseline, _ = settle(start, view)
+    before = held_out(baseline, view.disturbance)
+    judged = judge(found.naming, found.pattern)
+    added: list[AbstractEffect] = [named.effect for named in judged.named]
+    if judged.verdict == "unknown" and found.pattern is not None and found.pattern.significant:
+        added = [found.pattern.force]
+    improved, after, remaining = baseline, before, view
+    if added:
+        progress(f"fitting with {', '.join(effect.label for effect in added)}")
+        joined, remaining = join(view, start, added, naming.products.disturbance)
+        seen_later = held_out(joined, remaining.disturbance)
+        judged = helped(judged, luck(before, seen_later))
+        if judged.improves:
+            improved, after = joined, seen_later
+        else:
+            remaining = view
+    where = _where(judged, found, field, train)
+    physics = [_physics(named, improved) for named in judged.named]
     diagnosis = Diagnosis(
         verdict=judged.verdict,
         vehicle=layout.name,
@@ -82,135 +93,84 @@ def diagnose(
         where=where,
         physics=physics,
         fit={
-            "train": {"baseline": before_train, "improved": channel_scaled(improved, sigma)},
+            "train": {"baseline": channel_scaled(baseline), "improved": channel_scaled(improved)},
             "held_out": {"baseline": before.rms, "improved": after.rms},
         },
         candidates=naming.candidates,
         forces=field.traces,
-        remaining_forces=remaining,
+        remaining_forces=field.traces if remaining is view else traces(remaining, train),
         overlays=overlays(held, layout.channels, before, after),
         coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, baseline, improved),
         channels=channel_quality(improved),
         runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
-        notes=[*judged.notes, *noise_note(signals)],
+        notes=[*judged.notes, *disturbance_note(remaining), *noise_note(signals)],
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
         history=[
-            (label, {c: rms * float(s) for (c, rms), s in zip(seen.rms.items(), sigma, strict=True)})
-            for label, seen in zip(["baseline", *(s.label for s in naming.steps)], held_out, strict=True)
+            (label, {c: rms * float(s) for (c, rms), s in zip(seen.rms.items(), start.sigma, strict=True)})
+            for label, seen in [("baseline", before), *([("improved", after)] if improved is not baseline else [])]
         ],
     )
     return diagnosis, improved.vehicle
 
 
-def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
-    """The recordings as the batch that `vehicle` takes, with as many integration steps a sample as it needs."""
-    layout = vehicle.layout
-    rates = np.linalg.solve(np.asarray(vehicle.mass_matrix()), np.asarray(vehicle.damping_matrix()))
-    fastest = float(np.max(np.abs(np.linalg.eigvals(rates))))
-    longest = max(float(np.diff(r.times).max()) for r in recordings)
-    # linear damping is exact at any step; effects that replace it have the same rate and are not
-    substeps = int(np.clip(np.ceil(longest * fastest / 1.5), 1, 16))
-    return stack_runs(
-        recordings, held=layout.held, interpolated=layout.interpolated, channels=layout.channels, substeps=substeps
-    )
+def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
+    """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
+    tried = [effect for effect in candidates(facts(view), vocabulary) if effect.label not in present(view)]
+    columns, owners = candidate_columns(view, tried)
+    evidence = Evidence.of(view, columns)
+    naming = name(Selector(evidence, tried, owners), progress)
+    progress("looking for forces without a name")
+    asked: list[Disturbance] = [evidence.best([])[1].disturbance, naming.products.disturbance]
+    return Found(view, naming, pattern(view, evidence, naming.columns, asked))
 
 
-def judge(baseline: Fit, naming: Naming, held_out: Sequence[HeldOut]) -> Judged:
-    """The verdict: is there a mismatch, does what was named explain it, and does it help on the held-out runs?
-
-    Effects count up to the first that makes the held-out runs worse; `held_out` holds the baseline's and each step's.
-    """
-    p_value = min(1.0, 2.0 * min(naming.first_p, whiteness_p_value(baseline)))
-    if not naming.steps:
-        return Judged("unknown" if p_value < SIGNIFICANCE else "none", [], p_value, [])
-    squares = [free_run.chi_square for free_run in held_out]
-    helped = next((i for i, gain in enumerate(np.diff(squares)) if not gain < 0.0), len(naming.steps))
-    steps, notes = naming.steps[:helped], []
-    if helped < len(naming.steps):
-        refused = naming.steps[helped].label
-        notes.append(f"{refused} fitted the training runs better but the held-out runs worse, and is not accepted.")
-    if not steps:
-        return Judged("unknown", [], p_value, notes)
-    best = steps[-1].fit
-    left = min(naming.last_p, whiteness_p_value(best))
-    share = explained(baseline, best)
-    if share < EXPLAINED and left < SIGNIFICANCE:
-        labels = ", ".join(step.label for step in steps)
-        notes.append(f"{labels} would explain {share:.0%} of the mismatch, too little for its cause.")
-        return Judged("unknown", [], p_value, notes)
-    notes += mirrored(naming, steps[0])
-    if left < SIGNIFICANCE:
-        notes.append(f"{share:.0%} of the mismatch is explained; the residuals are still not white.")
-    verdict: Verdict = "named" if all(certain(step) for step in steps) else "ambiguous"
-    return Judged(verdict, steps, p_value, notes)
+def present(view: View) -> set[str]:
+    """Labels of the effects that a view's vehicle has already."""
+    return {effect.label for effect in view.vehicle.effects}
 
 
-def mirrored(naming: Naming, step: Step) -> list[str]:
-    """Effects with the trace of the accepted one and the opposite sign: only the difference of the two is told."""
-    scored = {candidate.label: candidate for candidate in naming.candidates}
-    accepted = scored.get(step.label)
-    if accepted is None:
-        return []
-    twins = [
-        candidate.effect
-        for candidate in naming.candidates
-        if candidate.outcome == "of inadmissible sign"
-        and abs(candidate.statistic / max(accepted.statistic, 1e-300) - 1.0) < _TWIN
-    ]
-    said = "leaves the same trace with the opposite sign: the recordings tell only the difference of the two."
-    return [f"{twin} {said} {step.label} is what is left of it." for twin in twins]
-
-
-def explained(baseline: Fit, improved: Fit) -> float:
-    """The share of the baseline's squared residuals above the recordings' white noise that the improvement removes."""
-    mask, samples = np.asarray(baseline.runs.mask), np.asarray(baseline.runs.samples())
-    sigma = np.asarray(improved.sigma)
-    noise = record_sigma(np.asarray(improved.model.error), mask)
-    squares = lambda fit: float(np.sum((np.asarray(fit.model.error) / sigma) ** 2))
-    floor = float(np.sum(samples * np.minimum(noise / sigma, 1.0) ** 2))
-    above = squares(baseline) - floor
-    return float(np.clip((squares(baseline) - squares(improved)) / above, 0.0, 1.0)) if above > 0.0 else 1.0
-
-
-def channel_scaled(found: Fit, sigma: Array) -> dict[str, float]:
-    """rms(error)/σ on the training runs with a common σ for baseline and improved."""
-    return {c: found.rms[c] * float(found.sigma[i] / sigma[i]) for i, c in enumerate(found.vehicle.layout.channels)}
-
-
-def _where(judged: Judged, baseline: Fit, path: Trajectory, field: Field, train: Sequence[Recording]) -> list[Location]:
-    """Where the mismatch lies: what was named says best, else the missing force itself."""
+def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:
+    """The mismatch's places: where accepted effects act, or where the force without a name does, else as located."""
     if judged.verdict == "none":
         return []
-    if not judged.steps:
-        return locations(field, baseline, path, train)
-    last = judged.steps[-1].fit.vehicle.effects
-    return locations(field, baseline, path, train, effect_share(baseline, path, last[-len(judged.steps) :]))
+    share, view = field.share, found.view
+    if judged.named:
+        effects = [named.effect for named in judged.named]
+        share = effect_shares(view, effects, found.naming.products.disturbance)
+    elif found.pattern is not None and found.pattern.significant:
+        own = found.pattern.force.equation
+        share = {place: 0.5 * part for place, part in share.items()}
+        share[own] = share.get(own, 0.0) + 0.5
+    return locations(field, view, train, share)
 
 
-def _physics(step: Step, improved: Fit) -> Physics:
+def _physics(named: Named, improved: Fit) -> Physics:
     """An accepted effect with its numbers from the final fit."""
-    effect = next(e for e in improved.vehicle.effects if e.label == step.label)
-    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in step.rivals]
+    effect = next((e for e in improved.vehicle.effects if e.label == named.effect.label), named.effect)
+    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals]
     return Physics(
         effect.name,
         effect.label,
         list(effect.where),
         effect.expression,
-        step.probability,
+        named.probability,
         estimates(improved, effect.label, effect.symbols()),
         rivals,
     )
 
 
-def summary(verdict: Verdict, physics: list[Physics], where: list[Location]) -> str:
-    """The verdict in one sentence."""
-    places = " and ".join(place.where for place in where[:2]) or "no equation"
-    names = ", then ".join(found.effect for found in physics)
-    if verdict == "none":
-        return "The model explains the recordings: nothing significant is left in the residuals."
-    if verdict == "named":
-        return f"The model leaves out {names}, felt in {places}; with it the held-out runs fit better."
-    if verdict == "ambiguous":
-        rivals = sorted({rival.effect for found in physics for rival in found.rivals})
-        return f"Something is missing in {places}: {names}, but these runs cannot tell it from {', '.join(rivals)}."
-    return f"Something is missing in {places}, and nothing in the vocabulary explains it."
+def channel_scaled(found: Fit) -> dict[str, float]:
+    """rms(error)/σ on the training runs."""
+    return found.rms
+
+
+def disturbance_note(view: View) -> list[str]:
+    """One line: the forces that no model predicts, where they are larger than their own smallest visible size."""
+    layout, disturbance = view.vehicle.layout, view.disturbance
+    total = np.asarray(view.followed.force).std(axis=(0, 1))
+    said = [
+        f"{e} ({float(q):.3g} {'N' if e in ('surge', 'sway', 'heave') else 'N m'}, {float(t):.2g} s)"
+        for e, q, t, rms in zip(layout.equations, disturbance.force, disturbance.time, total, strict=True)
+        if rms > 0.3 * float(q)
+    ]
+    return [f"What is left looks like random forces in {', '.join(said)}."] if said else []

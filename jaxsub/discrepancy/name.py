@@ -1,165 +1,234 @@
-r"""Which physics was left out: scan, refit the strongest, weigh them against each other, accept, scan again.
+r"""Which physics was left out: forward selection with backward elimination by evidence, and the rivals' probabilities.
 
-A refitted explanation e with k_e parameters has quasi-likelihood weight
-$\exp[-\tfrac12(\chi^2_e/\kappa + k_e\ln N)]$: the Bayesian information criterion, with χ² divided by the inflation κ
-that coloured residuals cause (Burnham and Anderson 2002, §2.5). Weights of all forms of one effect add up.
+Nothing is refitted for a selection: along the motion that took place the recordings are close to linear in the
+coefficients, in the amplitudes and in small changes of lags and the like, so a set of effects is judged by its block of
+one matrix of products. The probability of an effect is its evidence over that of all that may stand in its place, the
+others chosen held; equal before the data for every name, and within a name for every form.
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
+from scipy import special
 
-from ..effects import AbstractEffect, numbers
-from ..estimate import Fit, evaluate, fit, search
-from ..results import RESULTS
-from ..vehicle import AbstractVehicle
-from .columns import Trajectory
+from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
 from .diagnosis import Candidate
-from .refit import SIGNIFICANCE, Explanation, Progress, refit_all
-from .scan import ABSORBED, Score, scan
+from .evidence import SLOTS, Evidence, Products
+from .progress import Progress
 
-MOST_EFFECTS = 3
-_CERTAIN = 0.9
+SIGNIFICANCE = 0.01
+MOST_EFFECTS = 4
+_ABSORBED = 1e-4
 _POSSIBLE = 0.02
-_GROSS = 5.0
-_PIECES = 8
+# disturbances estimated for rivals of one step
+_TRIES = 3
 
 
 @dataclasses.dataclass(frozen=True)
-class Step:
-    """One effect accepted: the fit with it, the probability of its name, and the refitted rivals with theirs."""
+class Named:
+    """An effect chosen: with its predicted numbers, the probability of its name, and the rivals with theirs."""
 
-    fit: Fit
-    label: str
+    effect: AbstractEffect
     probability: float
     rivals: list[tuple[AbstractEffect, float]]
 
 
 @dataclasses.dataclass(frozen=True)
-class Naming:
-    """The effects accepted one after the other, the first scan for the record, and the p-value of what is left."""
+class Scan:
+    """Every candidate on top of some chosen ones.
 
-    steps: list[Step]
+    **Fields**
+
+    - `value`: (m,) log evidence at the disturbance that suits each best; minus infinity where physics forbids it.
+    - `statistic`: (m,) χ² over the chosen ones alone. `effects`: with predicted numbers. `right`: (m,) of admissible
+      sign.
+    """
+
+    value: np.ndarray
+    statistic: np.ndarray
+    effects: list[AbstractEffect]
+    right: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Naming:
+    """What was chosen, in order, and how.
+
+    **Fields**
+
+    - `products`: at the disturbance that is left. `columns`: of what was chosen. `value`: its log evidence.
+    - `first`: the scan before any choice; `candidates`: its lines for the report.
+    - `first_p`, `last_p`: p-values of the first choice and of what is left.
+    """
+
+    named: list[Named]
+    products: Products
+    columns: list[int]
+    value: float
+    first: Scan
     candidates: list[Candidate]
     first_p: float
     last_p: float
 
 
-def name(
-    baseline: Fit, start: AbstractVehicle, vocabulary: Callable[[Fit], Sequence[AbstractEffect]], progress: Progress
-) -> Naming:
-    """Forward selection from `baseline` over `vocabulary`, until nothing significant and admissible is left.
+class Selector:
+    """The evidence of sets of candidates, and the disturbances estimated for some of them."""
 
-    `start` is the vehicle that the baseline was fitted from.
-    """
-    best, steps, table, first_p, last_p = baseline, [], [], 1.0, 1.0
+    def __init__(self, evidence: Evidence, candidates: Sequence[AbstractEffect], owners: Sequence[Sequence[int]]):
+        self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
+        kept = evidence.products[0].kept(self.owners)
+        self.usable = np.isfinite(kept) & (kept > _ABSORBED)
+        self.shares = kept
+        self.estimated: set[tuple[int, ...]] = set()
+
+    def columns(self, chosen: Sequence[int]) -> list[int]:
+        """The columns of candidates."""
+        return [column for i in chosen for column in self.owners[i]]
+
+    def value(self, chosen: Sequence[int]) -> float:
+        """Log evidence at the best disturbance."""
+        return self.evidence.best(self.columns(chosen))[0]
+
+    def estimate(self, chosen: Sequence[int]) -> None:
+        """Find the disturbance that is left with `chosen` in the model."""
+        key = tuple(sorted(chosen))
+        if key not in self.estimated:
+            self.estimated.add(key)
+            own = self.columns(chosen)
+            self.evidence.products.append(self.evidence.estimate(own, self.evidence.best(own)[1].disturbance))
+
+    def scan(self, chosen: Sequence[int]) -> Scan:
+        """Every candidate on top of `chosen`."""
+        own = self.columns(chosen)
+        base = self.value(chosen)
+        best, statistic = np.full(len(self.candidates), -np.inf), np.zeros(len(self.candidates))
+        sizes: list[np.ndarray] = [np.zeros(len(columns)) for columns in self.owners]
+        for products in self.evidence.products:
+            gains, at = products.gains(own, self.owners), products.solve(own)[0]
+            values = at + gains.evidence
+            for i in np.flatnonzero(values > best):
+                # twice the gain in likelihood, the disturbances of both their own
+                best[i], sizes[i] = values[i], gains.amplitudes[i]
+                statistic[i] = max(0.0, gains.statistic[i] + 2.0 * (at - base))
+        taken = {self.candidates[i].label for i in chosen}
+        effects, right = [], []
+        for i, effect in enumerate(self.candidates):
+            predicted, good = predict(effect, sizes[i] / self.evidence.length[self.owners[i]])
+            effects.append(predicted)
+            right.append(good and bool(self.usable[i]) and effect.label not in taken)
+        fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
+        return Scan(np.where(fine, best, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
+
+    def p_value(self, statistic: float, columns: int) -> float:
+        """Of χ² with so many columns, corrected for all candidates tried."""
+        tried = len({(c.label, *c.symbols()) for c in self.candidates})
+        return min(1.0, tried * float(special.chdtrc(columns, statistic)))
+
+
+def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:
+    """An effect with predicted numbers, and whether physics admits them."""
+    names = amplitudes(effect)
+    if names:
+        values = dict(zip(names, amplitude.tolist(), strict=True))
+        found = with_numbers(effect, values)
+        return found, admissible(effect, {**numbers(effect), **values})
+    # a lag that wants to be of the other sign shows as a negative share of its own grid value
+    return effect, bool(amplitude[0] > 0.0)
+
+
+def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan], list[float]]:
+    """Candidates chosen one after the other; the scans before each choice and at the end; the p-values of each best."""
+    chosen: list[int] = []
+    scans, p_values = [], []
     while True:
-        progress(f"scanning the vocabulary ({len(steps)} effects so far)")
-        present = {effect.label for effect in best.vehicle.effects}
-        tried = [c for c in vocabulary(best) if c.label not in present]
-        view = best if steps else viewpoint(baseline, start)
-        path = Trajectory.of(view)
-        scores = scan(view, tried, path)
-        last_p = min((score.p_value for score in scores), default=1.0)
-        refitted = refit_all(best, view, path, scores, progress) if len(steps) < MOST_EFFECTS else []
-        if not table:
-            first_p, table = last_p, _table(scores, refitted)
-        step = _accept(best, refitted, len(tried), progress)
-        if step is None:
-            return Naming(steps, table, first_p, last_p)
-        steps.append(step)
-        best = step.fit
-
-
-def viewpoint(baseline: Fit, start: AbstractVehicle) -> Fit:
-    """The fit that the first scan looks from: the baseline, or where it misses grossly, a fit to short pieces.
-
-    Coefficients that had to make up for a large missing force over a whole run are far from the truth, and so is
-    everything linearised about them. Over short pieces, each with its own initial state, the missing force has no time
-    to drive the model away.
-    """
-    given = [output.sigma is not None for output in baseline.vehicle.layout.outputs]
-    worst = max((rms for rms, known in zip(baseline.rms.values(), given, strict=True) if known), default=0.0)
-    if worst < _GROSS and not bool(baseline.result == RESULTS.max_steps_reached):
-        return baseline
-    return fit(start, baseline.runs.segments(_PIECES), sigma=baseline.sigma)
-
-
-def _accept(before: Fit, refitted: list[Explanation], tried: int, progress: Progress) -> Step | None:
-    """The most probable admissible explanation as a step, if its gain is significant for all tried."""
-    usable = [e for e in refitted if e.admissible and e.cost < float(before.cost)]
-    if not usable:
-        return None
-    weights = _weights(before, usable)
-    by_name: dict[str, float] = {}
-    for explanation, weight in zip(usable, weights, strict=True):
-        by_name[explanation.effect.name] = by_name.get(explanation.effect.name, 0.0) + weight
-    best = max(zip(usable, weights, strict=True), key=lambda pair: (by_name[pair[0].effect.name], pair[1]))[0]
-    gain = 2.0 * (float(before.cost) - best.cost) / noise_inflation(before, best)
-    if gain < 2.0 * np.log(tried / SIGNIFICANCE):
-        return None
-    progress(f"fitting with {best.effect.label}")
-    vehicle, start, sigma, cost, steps, result = best.found
-    if any(output.sigma is None for output in vehicle.layout.outputs):
-        # noise that the file leaves open was the baseline's misfit until now
-        vehicle, start, sigma, cost, steps, result = search(vehicle, before.runs, start=start)
-    improved = evaluate(vehicle, before.runs, start, sigma, cost=cost, steps=steps, result=result)
-    rivals: dict[str, tuple[AbstractEffect, float]] = {}
-    for explanation in usable:
-        kind = explanation.effect.name
-        if kind != best.effect.name and kind not in rivals and by_name[kind] > _POSSIBLE:
-            rivals[kind] = (explanation.effect, by_name[kind])
-    ranked = sorted(rivals.values(), key=lambda rival: -rival[1])
-    return Step(improved, best.effect.label, by_name[best.effect.name], ranked)
-
-
-def _weights(before: Fit, usable: list[Explanation]) -> list[float]:
-    """Posterior weights of refitted explanations, equal before the data."""
-    least = min(usable, key=lambda explanation: explanation.cost)
-    samples = float(np.sum(np.asarray(before.runs.mask)))
-    size = np.array([len(numbers(e.effect)) for e in usable])
-    log = -np.array([e.cost for e in usable]) / noise_inflation(before, least) - 0.5 * size * np.log(samples)
-    weights = np.exp(log - log.max())
-    return (weights / weights.sum()).tolist()
-
-
-def noise_inflation(before: Fit, explanation: Explanation) -> float:
-    """By how much χ² overstates the evidence: 1 where the refit reaches the stated noise, else as its score has it."""
-    samples = float(np.sum(np.asarray(before.runs.mask)))
-    stated = all(output.sigma is not None for output in before.vehicle.layout.outputs)
-    at_floor = 2.0 * explanation.cost < samples + 5.0 * np.sqrt(2.0 * samples)
-    return 1.0 if stated and at_floor else explanation.score.inflation
-
-
-def certain(step: Step) -> bool:
-    """Whether one name stands clear of its rivals."""
-    return step.probability >= _CERTAIN
-
-
-def _table(scores: Sequence[Score], refitted: list[Explanation]) -> list[Candidate]:
-    """The scan as lines for the report: the best form of every label."""
-    outcome = {}
-    for explanation in refitted:
-        drop = explanation.score.effect.label
-        outcome[drop] = "refitted" if explanation.admissible else "refitted, then of inadmissible sign"
-    lines: dict[str, Candidate] = {}
-    for score in scores:
-        effect = score.effect
-        symbols = effect.symbols()
-        said = outcome.get(effect.label, _outcome(score))
-        predicted = {symbols[field]: value for field, value in numbers(effect).items()}
-        line = Candidate(
-            effect.name, effect.label, score.statistic, score.degrees, score.p_value, predicted, score.kept, said
+        progress(f"weighing the vocabulary ({len(chosen)} effects so far)")
+        scan = _settled(selector, chosen)
+        scans.append(scan)
+        best = int(np.argmax(scan.value))
+        gain = scan.value[best] - selector.value(chosen)
+        p_values.append(
+            selector.p_value(float(scan.statistic[best]), len(selector.owners[best])) if np.isfinite(gain) else 1.0
         )
-        key = f"{effect.label} {sorted(symbols.values())}"
-        lines.setdefault(key, line)
+        if not gain > 0.0 or p_values[-1] >= SIGNIFICANCE or len(chosen) == MOST_EFFECTS:
+            return chosen, scans, p_values
+        chosen = _without_idle(selector, [*chosen, best])
+
+
+def _settled(selector: Selector, chosen: list[int]) -> Scan:
+    """The scan once the leaders' own disturbances are known: what a rival leaves to a disturbance must not count."""
+    for _ in range(_TRIES):
+        scan = selector.scan(chosen)
+        best = int(np.argmax(scan.value))
+        if not np.isfinite(scan.value[best]) or scan.value[best] - selector.value(chosen) < -5.0:
+            return scan
+        if tuple(sorted([*chosen, best])) in selector.estimated:
+            return scan
+        selector.estimate([*chosen, best])
+    return selector.scan(chosen)
+
+
+def _without_idle(selector: Selector, chosen: list[int]) -> list[int]:
+    """`chosen` less those that the others make idle."""
+    while len(chosen) > 1:
+        whole = selector.value(chosen)
+        less = [selector.value([c for c in chosen if c != i]) for i in chosen]
+        worst = int(np.argmax(less))
+        if less[worst] < whole:
+            return chosen
+        chosen = [c for c in chosen if c != chosen[worst]]
+    return chosen
+
+
+def name(selector: Selector, progress: Progress) -> Naming:
+    """The effects that the recordings ask for, with probabilities."""
+    chosen, scans, p_values = select(selector, progress)
+    value, products = selector.evidence.best(selector.columns(chosen))
+    named = [_named(selector, chosen, i) for i in chosen]
+    lines = table(selector, scans[0])
+    return Naming(named, products, selector.columns(chosen), value, scans[0], lines, p_values[0], p_values[-1])
+
+
+def _named(selector: Selector, chosen: list[int], index: int) -> Named:
+    """The probability of what stands in one place of the chosen set, and of what might stand there."""
+    others = [i for i in chosen if i != index]
+    scan = selector.scan(others)
+    forms: dict[str, int] = {}
+    for effect in selector.candidates:
+        forms[effect.name] = forms.get(effect.name, 0) + 1
+    log = scan.value - np.log([forms[effect.name] for effect in selector.candidates])
+    weights = np.exp(log - np.max(log))
+    weights /= np.sum(weights)
+    by_name: dict[str, float] = {}
+    best: dict[str, int] = {}
+    for i, (effect, weight) in enumerate(zip(selector.candidates, weights, strict=True)):
+        by_name[effect.name] = by_name.get(effect.name, 0.0) + float(weight)
+        if weight > weights[best.setdefault(effect.name, i)]:
+            best[effect.name] = i
+    own = selector.candidates[index].name
+    rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > _POSSIBLE]
+    effect = scan.effects[index]
+    return Named(effect, by_name[own], sorted(rivals, key=lambda rival: -rival[1]))
+
+
+def table(selector: Selector, scan: Scan) -> list[Candidate]:
+    """The first scan as lines for the report: the best form of every label, the strongest first."""
+    lines: dict[str, Candidate] = {}
+    for i in np.argsort(-scan.statistic):
+        effect, columns, statistic = scan.effects[i], len(selector.owners[i]), float(scan.statistic[i])
+        symbols = effect.symbols()
+        predicted = {symbols[field]: value for field, value in numbers(effect).items()}
+        p_value = selector.p_value(statistic, columns)
+        kept = float(selector.shares[i]) if selector.usable[i] else 0.0
+        said = _outcome(bool(selector.usable[i]), bool(scan.right[i]), p_value)
+        line = Candidate(effect.name, effect.label, statistic, columns, p_value, predicted, kept, said)
+        lines.setdefault(f"{effect.label} {sorted(symbols.values())}", line)
     return list(lines.values())
 
 
-def _outcome(score: Score) -> str:
-    if score.kept < ABSORBED:
+def _outcome(usable: bool, right: bool, p_value: float) -> str:
+    if not usable:
         return "absorbed by the coefficients"
-    if score.p_value >= SIGNIFICANCE:
+    if p_value >= SIGNIFICANCE:
         return "not significant"
-    return "weaker than the best" if score.admissible else "of inadmissible sign"
+    return "significant" if right else "of inadmissible sign"

@@ -3,18 +3,21 @@
 import dataclasses
 from collections.abc import Sequence
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..effects import CHANNEL_UNITS
-from ..estimate import Fit, channel_rms, output_errors, predict, search
+from ..estimate import Fit, channel_rms, initial_guess, output_errors, predict, search
+from ..likelihood import Disturbance, follow, whitened
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .diagnosis import ChannelQuality, Coefficient, Estimate, Overlay, RunQuality
 
 _WEAK, _OPEN = 0.5, 5.0
+_BLOCKS, _DRAWS = 24, 1999
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,26 +25,54 @@ class HeldOut:
     """A vehicle's free run through runs that its fit did not see: only their initial states were found.
 
     `predicted` and `error` are lists of (K, c) arrays in SI, a run each; `rms` is rms(error)/σ by channel.
+    `expected` are (K,) log likelihoods of each sample given those before it, a run each.
     """
 
     predicted: list[np.ndarray]
     error: list[np.ndarray]
     rms: dict[str, float]
-    chi_square: float
+    expected: list[np.ndarray]
 
 
-def hold(vehicle: AbstractVehicle, runs: Runs, chosen: Sequence[int], size: int, sigma: Array) -> HeldOut:
+def hold(
+    vehicle: AbstractVehicle, runs: Runs, chosen: Sequence[int], size: int, sigma: Array, disturbance: Disturbance
+) -> HeldOut:
     """`vehicle` on the runs numbered `chosen`, in batches of `size`, the size of the training batch."""
-    predicted, errors = [], []
+    predicted, errors, expected = [], [], []
     for first in range(0, len(chosen), size):
         batch = list(chosen[first : first + size])
         taken = runs.take(batch, size)
         _, start, *_ = search(vehicle, taken, sigma=sigma, moving=False)
         predicted += list(np.asarray(predict(vehicle, taken, start))[: len(batch)])
         errors += list(np.asarray(output_errors(vehicle, taken, start))[: len(batch)])
+        spread = initial_guess(vehicle, taken)[1]
+        expected += list(np.asarray(_expected(vehicle, taken, sigma, disturbance, start, spread))[: len(batch)])
     whitened = np.stack(errors) / np.asarray(sigma)
     rms = channel_rms(jnp.asarray(whitened), runs.take(list(chosen), len(chosen)), vehicle.layout.channels)
-    return HeldOut(predicted, errors, rms, float(np.sum(whitened**2)))
+    return HeldOut(predicted, errors, rms, expected)
+
+
+@eqx.filter_jit
+def _expected(
+    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, spread: Array
+) -> Float[Array, "r k"]:
+    """How probable each sample is given those before it, as a logarithm."""
+    followed = follow(vehicle, runs, sigma, disturbance, start, spread)
+    white, factor = whitened(disturbance, followed.system, followed.residual)
+    logarithm = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)), axis=-1)
+    return -logarithm - 0.5 * jnp.sum(white[..., 0] ** 2, axis=-1)
+
+
+def luck(before: HeldOut, after: HeldOut) -> tuple[float, float]:
+    """The gain in log likelihood of the held-out runs, and the probability that it is luck.
+
+    By a bootstrap over blocks of samples (Künsch 1989, Ann. Statist. 17): neighbouring samples' gains go together.
+    """
+    gains = [a - b for a, b in zip(after.expected, before.expected, strict=True)]
+    blocks = np.concatenate([[part.sum() for part in np.array_split(gain, _BLOCKS)] for gain in gains])
+    rng = np.random.default_rng(0)
+    drawn = rng.choice(blocks, (_DRAWS, len(blocks))).sum(axis=1)
+    return float(blocks.sum()), float((1 + np.sum(drawn <= 0.0)) / (1 + _DRAWS))
 
 
 def overlays(

@@ -1,6 +1,7 @@
 """Estimation: one `fit`, one `Fit`, and the methods that may do it."""
 
 from .combined import Chain, Global
+from .disturbance import estimate_disturbance
 from .filtered import Filtered
 from .fit import Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
 from .method import AbstractMethod, Found, Iterative
@@ -24,6 +25,7 @@ __all__ = [
     "basins",
     "channel_rms",
     "ekf",
+    "estimate_disturbance",
     "evaluate",
     "fit",
     "gauss_newton",

@@ -13,10 +13,13 @@ from ..likelihood import errors
 from ..parameters import Transform
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
+from ..vehicle.base import memory_states
 from .newton import second_order
 
 # how far an initial state that nothing measures may lie from rest: m/s, rad/s, rad, m
 _SPREAD = {"m/s": 1.0, "rad/s": 0.5, "rad": 0.5, "m": 10.0}
+# of what an effect remembers, which starts at zero
+_MEMORY = 0.1
 
 
 class Problem(eqx.Module):
@@ -177,8 +180,9 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
     mask, outputs = np.asarray(runs.mask), np.asarray(runs.outputs)
     guess = np.zeros((runs.times.shape[0], len(names)))
     spread = np.ones(len(names))
+    kept = memory_states(vehicle.effects)
     for i, name in enumerate(names):
-        spread[i] = _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
+        spread[i] = _MEMORY if name in kept else _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
         channel = next((c for c in aliases.get(name, (name,)) if c in layout.channels), None)
         if channel is None:
             guess[:, i] = float(vehicle.own_values()["speed"]) if body and name == "u" else 0.0

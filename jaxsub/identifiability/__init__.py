@@ -4,7 +4,6 @@ from .coloured import Coloured, coloured_covariance
 from .design import Design, design, keeping
 from .design_information import Information, information
 from .design_limits import Limits
-from .disturbance import Disturbance
 from .equivalence import Equivalent, Family, equivalent_systems
 from .profile import Profile, profile
 from .rank import Identifiability, Verdict, identifiability, identifiable_subset
@@ -12,7 +11,6 @@ from .rank import Identifiability, Verdict, identifiability, identifiable_subset
 __all__ = [
     "Coloured",
     "Design",
-    "Disturbance",
     "Equivalent",
     "Family",
     "Identifiability",

@@ -16,9 +16,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import Fit, Problem
-from ..likelihood import Linearised, force_columns
-from .disturbance import Disturbance, Whitened, carried, estimate_disturbance
+from ..estimate import Fit, Problem, estimate_disturbance
+from ..likelihood import (
+    Columns,
+    Disturbance,
+    Linearised,
+    System,
+    carried,
+    first_guess,
+)
 
 
 class Coloured(eqx.Module):
@@ -65,13 +71,11 @@ def _corrected(problem: Problem, model: Linearised) -> tuple[Float[Array, "p p"]
     # a direction that nothing tells has an empty column, and must not make the matrix of the others singular
     empty = jnp.all(basis == 0.0, axis=0)
     prior = prior.at[1:, 1:].add(jnp.diag(jnp.where(empty, 1.0, 0.0)))
-    measured = problem.runs.mask
-    shown, intervals = measured / problem.sigma, problem.runs.steps[problem.runs.step_of]
-    C = model.C * shown[..., None]
-    data = Whitened(residual, theta @ basis, start, prior, model.A, model.G, C, intervals, measured)
-    disturbance = estimate_disturbance(data, _unit(model, shown, residual))
+    system = System.of(model, problem.runs, problem.sigma, problem.spread)
+    columns = Columns(jnp.concatenate([residual[..., None], theta @ basis], axis=-1))
+    disturbance = estimate_disturbance(system, columns, prior, first_guess(system, residual))
     # D = basis basisᵀ, so that white noise alone gives D back
-    middle = basis.T @ (carried(disturbance, data, left) + pinned) @ basis
+    middle = basis.T @ (carried(disturbance, system, left) + pinned) @ basis
     return basis @ middle @ basis.T + untold @ untold.T, disturbance
 
 
@@ -91,12 +95,3 @@ def _directions(information: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], 
     columns = vectors / jnp.sqrt(jnp.maximum(values, 50.0 * eps)) / scale[:, None]
     told = values > 1e4 * eps
     return jnp.where(told, columns, 0.0), jnp.where(told, 0.0, columns)
-
-
-def _unit(model: Linearised, shown: Array, residual: Array) -> Float[Array, " n"]:
-    """A force in each equation whose lasting effect is as large as the residuals: where to start looking."""
-    n = model.G.shape[3] // 2
-    steady = jnp.broadcast_to(jnp.eye(n), (*model.G.shape[:2], n, n))
-    response = force_columns(model, steady, steady) * shown[..., None]
-    effect = jnp.sqrt(jnp.sum(response**2, (0, 1, 2)))
-    return jnp.sqrt(jnp.sum(residual**2)) / jnp.where(effect > 0.0, effect, 1.0)

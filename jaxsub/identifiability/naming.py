@@ -10,4 +10,4 @@ def state_names(vehicle: AbstractVehicle) -> dict[str, str]:
     if layout.kind != "submerged-body":
         return dict.fromkeys([*(f"{e}_rate" for e in layout.equations), *layout.positions], "")
     names = [VELOCITIES[e] for e in layout.equations] + list(layout.positions)
-    return {name: CHANNEL_UNITS[name] for name in names}
+    return {name: CHANNEL_UNITS.get(name, "") for name in names}

@@ -1,15 +1,30 @@
 """Likelihoods: how probable a recording is under a model, and how that changes with everything in it."""
 
+from .disturbance import Columns, Disturbance, System, carried, first_guess, fitted, restricted, smoothed, whitened
+from .innovations import Followed, follow
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
-from .sensitivity import Linearised, force_columns, linearise, propagate
+from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise, propagate
 
 __all__ = [
+    "Columns",
+    "Disturbance",
+    "Followed",
+    "Jacobians",
     "Linearised",
+    "System",
+    "carried",
     "concentrated_sigma",
     "errors",
+    "first_guess",
+    "fitted",
+    "follow",
     "force_columns",
+    "jacobians",
     "linearise",
     "negative_log_likelihood",
     "propagate",
     "residual_outputs",
+    "restricted",
+    "smoothed",
+    "whitened",
 ]

@@ -53,44 +53,70 @@ def propagate(
     return jnp.concatenate([start[:, None], swap(following)], axis=1)
 
 
-@eqx.filter_jit
-def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
-    """`vehicle` along its trajectory from the initial states `start`."""
+class Jacobians(eqx.Module):
+    """Of a model's step and outputs, at given states.
+
+    **Fields**
+
+    - `A`, `G`, `C`: as of `Linearised`. `F`: (R, K-1, s, p) of the step by the free parameters.
+    - `direct`: (R, K, c, p) of the outputs by the free parameters, the state held.
+    """
+
+    A: Float[Array, "r k1 s s"]
+    G: Float[Array, "r k1 s n2"]
+    C: Float[Array, "r k c s"]
+    F: Float[Array, "r k1 s p"]
+    direct: Float[Array, "r k c p"]
+
+
+def jacobians(
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    before: Float[Array, "r k1 s"],
+    at: Float[Array, "r k s"],
+    push: Float[Array, "r k1 2 n"] | None = None,
+) -> Jacobians:
+    """The steps taken from the states `before`, under `push` if given, and the outputs `at` others."""
     names = [row.name for row in vehicle.layout.free]
     values = vehicle.values()
     theta = jnp.stack([values[name] for name in names]) if names else jnp.zeros(0)
     with_theta = lambda vector: vehicle.with_values(dict(zip(names, vector, strict=True)))
-    sampled = Sampled.of(vehicle, runs)
-    states = sampled.states(runs, start)
-    r, k, s = states.shape
-    n = sampled.inverse.shape[0]
-    before = states[:, :-1].reshape(r * (k - 1), s)
+    r, k1, s = before.shape
+    p, n = len(names), len(vehicle.layout.equations)
+    flat = before.reshape(r * k1, s)
+    pushes = jnp.zeros((len(flat), 2, n)) if push is None else push.reshape(-1, 2, n)
     index, live = runs.step_of.reshape(-1), runs.live.reshape(-1)[:, None, None]
 
-    def steps(model: Sampled, at: Array, push: Array) -> Array:
-        nodes = jax.vmap(model.vehicle.actuate)(runs.times, runs.nodes())
-        return jax.vmap(model.step)(at, nodes.reshape(len(before), 3, nodes.shape[-1]), index, push)
-
     def stepped(change: Array) -> Array:
-        parameters, moved, push = jnp.split(change, [len(names), len(names) + s])
-        pushed = jnp.broadcast_to(push.reshape(2, n), (len(before), 2, n))
-        return steps(Sampled.of(with_theta(theta + parameters), runs), before + moved, pushed)
+        parameters, moved, pushed = jnp.split(change, [p, p + s])
+        model = Sampled.of(with_theta(theta + parameters), runs)
+        nodes = jax.vmap(model.vehicle.actuate)(runs.times, runs.nodes())
+        nodes = nodes.reshape(len(flat), 3, nodes.shape[-1])
+        return jax.vmap(model.step)(flat + moved, nodes, index, pushes + pushed.reshape(2, n))
 
     def shown(change: Array) -> Array:
-        parameters, moved = jnp.split(change, [len(names)])
-        return with_theta(theta + parameters).measure(runs.times, states + moved, runs.signals)
+        parameters, moved = jnp.split(change, [p])
+        return with_theta(theta + parameters).measure(runs.times, at + moved, runs.signals)
 
-    p = len(names)
     F, A, G = jnp.split(_columns(stepped, jnp.zeros(p + s + 2 * n)), [p, p + s], axis=-1)
-    A = jnp.where(live, A, jnp.eye(s)).reshape(r, k - 1, s, s)
-    G, F = (jnp.where(live, M, 0.0).reshape(r, k - 1, s, M.shape[-1]) for M in (G, F))
+    A = jnp.where(live, A, jnp.eye(s)).reshape(r, k1, s, s)
+    G, F = (jnp.where(live, M, 0.0).reshape(r, k1, s, M.shape[-1]) for M in (G, F))
     direct, C = jnp.split(_columns(shown, jnp.zeros(p + s)), [p], axis=-1)
-    forcing = jnp.concatenate([F, jnp.zeros((r, k - 1, s, s))], axis=-1)
+    return Jacobians(A, G, C, F, direct)
+
+
+@eqx.filter_jit
+def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
+    """`vehicle` along its trajectory from the initial states `start`."""
+    states = Sampled.of(vehicle, runs).states(runs, start)
+    by = jacobians(vehicle, runs, states[:, :-1], states)
+    r, k1, s, p = by.F.shape
+    forcing = jnp.concatenate([by.F, jnp.zeros((r, k1, s, s))], axis=-1)
     origin = jnp.broadcast_to(jnp.concatenate([jnp.zeros((s, p)), jnp.eye(s)], 1), (r, s, p + s))
-    D = propagate(A, forcing, origin)
-    sensitivity = C @ D
+    sensitivity = by.C @ propagate(by.A, forcing, origin)
     error = residual_outputs(vehicle, runs, vehicle.measure(runs.times, states, runs.signals))
-    return Linearised(states, error, A, G, C, sensitivity[..., :p] + direct, sensitivity[..., p:])
+    theta, start = sensitivity[..., :p] + by.direct, sensitivity[..., p:]
+    return Linearised(states, error, by.A, by.G, by.C, theta, start)
 
 
 @eqx.filter_jit

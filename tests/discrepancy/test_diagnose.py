@@ -12,8 +12,8 @@ import pytest
 from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy import batch, diagnose
-from jaxsub.discrepancy.columns import Trajectory
-from jaxsub.discrepancy.locate import locate
+from jaxsub.discrepancy.locate import traces
+from jaxsub.discrepancy.view import look
 from jaxsub.effects import AbstractForce
 from jaxsub.effects.base import amplitude
 from jaxsub.effects.hull import CrossflowDrag, HullAsymmetry
@@ -103,9 +103,9 @@ def test_the_located_force_is_the_one_that_acts():
     rows = tuple(dataclasses.replace(row, free=False) for row in dsrv().layout.parameters)
     known = dataclasses.replace(dsrv(), layout=dataclasses.replace(dsrv().layout, parameters=rows))
     found = fit(known, batch(known, runs))
-    field = locate(found, Trajectory.of(found), runs)
-    assert max(field.share, key=lambda place: field.share[place]) == "heave"
-    for trace, recording in zip(field.traces, runs, strict=True):
+    view = look(found)
+    assert int(jnp.argmax(view.disturbance.force / jnp.array([100.0, 100.0]))) == 0
+    for trace, recording in zip(traces(view, runs), runs, strict=True):
         truth = np.interp(trace.times, recording.times, 400.0 * np.sin(0.4 * recording.column("z")))
         assert np.corrcoef(truth, trace.force["heave"])[0, 1] > 0.8
 

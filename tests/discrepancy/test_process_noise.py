@@ -8,9 +8,9 @@ import pytest
 from diagnosis_cases import INTERVAL, SAMPLES
 
 from jaxsub.discrepancy import batch
-from jaxsub.discrepancy.columns import Trajectory
-from jaxsub.discrepancy.locate import locate, locations
+from jaxsub.discrepancy.locate import Field, locations, traces
 from jaxsub.discrepancy.process_noise import NoiseSignal, calibrated, noise_note, noise_signals
+from jaxsub.discrepancy.view import look
 from jaxsub.effects import ActuatorLag
 from jaxsub.estimate import fit
 from jaxsub.recording import Recording
@@ -77,11 +77,8 @@ def test_locate_takes_it_as_evidence_and_a_note_says_it():
     runs = recorded("heave", 1)
     found = fitted(runs)
     signals = noise_signals(found, runs)
-    path = Trajectory.of(found)
-    field = locate(found, path, runs, signals)
-    assert list(field.signals) == signals
-    first = locations(field, found, path, runs)[0]
-    assert first.where == "heave"
+    view = look(found)
+    (first,) = locations(Field({}, traces(view, runs), signals), view, runs, {"heave": 1.0})
     covered = sum(min(b, EVENT[1]) - max(a, EVENT[0]) for run, a, b in first.times if run == "run1")
     assert covered > 0.8 * (EVENT[1] - EVENT[0])
     (line,) = noise_note(signals)
@@ -92,8 +89,8 @@ def test_locate_takes_it_as_evidence_and_a_note_says_it():
 def test_a_force_that_is_not_clear_alone_counts_where_the_filter_agrees():
     runs = recorded(None, 1)
     found = fitted(runs)
-    path = Trajectory.of(found)
-    field = locate(found, path, runs)
+    view = look(found)
+    field = Field({}, traces(view, runs))
     times = field.traces[1].times
     doubtful = dataclasses.replace(
         field.traces[1],
@@ -105,8 +102,8 @@ def test_a_force_that_is_not_clear_alone_counts_where_the_filter_agrees():
     alone = dataclasses.replace(field, traces=[doubtful])
     together = dataclasses.replace(alone, signals=[signal])
     share = {"heave": 1.0}
-    assert locations(alone, found, path, runs, share)[0].times == []
-    ((run, start, end),) = locations(together, found, path, runs, share)[0].times
+    assert locations(alone, view, runs, share)[0].times == []
+    ((run, start, end),) = locations(together, view, runs, share)[0].times
     assert run == "run1"
     assert abs(start - 30.0) < 2.0 and abs(end - 50.0) < 2.0
 

@@ -13,9 +13,8 @@ import pytest
 from rigs import driven, oscillator, stacked
 
 from jaxsub.estimate import evaluate
-from jaxsub.identifiability import Disturbance, coloured_covariance
-from jaxsub.identifiability.disturbance import Whitened, carried, restricted
-from jaxsub.likelihood import force_columns
+from jaxsub.identifiability import coloured_covariance
+from jaxsub.likelihood import Columns, Disturbance, System, carried, force_columns, restricted
 from jaxsub.results import RESULTS
 from jaxsub.simulate import synthetic
 
@@ -91,23 +90,20 @@ def dense():
     """A short random system of three states and two forces, and its residuals' covariance written out."""
     rng = np.random.default_rng(7)
     K, s, n, c, p = 6, 3, 2, 2, 2
-    data = Whitened(
-        residual=jnp.asarray(rng.standard_normal((1, K, c))),
-        theta=jnp.asarray(rng.standard_normal((1, K, c, p))),
-        start=jnp.asarray(rng.standard_normal((1, K, c, s))),
-        prior=jnp.zeros((p + 1, p + 1)),
+    data = System(
         A=jnp.asarray(0.6 * rng.standard_normal((1, K - 1, s, s))),
         G=jnp.asarray(rng.standard_normal((1, K - 1, s, 2 * n))),
         C=jnp.asarray(rng.standard_normal((1, K, c, s))),
-        intervals=jnp.asarray(rng.uniform(0.1, 0.5, (1, K - 1))),
         measured=jnp.ones((1, K, c), bool),
+        intervals=jnp.asarray(rng.uniform(0.1, 0.5, (1, K - 1))),
+        spread=jnp.asarray(rng.uniform(0.1, 2.0, s)),
     )
     disturbance = Disturbance(jnp.array([0.7, 1.3]), jnp.array([0.4, 2.0]), jnp.array([0.5, 1.1]))
     times = np.concatenate([[0.0], np.cumsum(np.asarray(data.intervals)[0])])
     size, tau = np.asarray(disturbance.force), np.asarray(disturbance.time)
     forces = size**2 * np.exp(-np.abs(times[:, None] - times)[..., None] / tau)
     answer = np.zeros((K, c, K, n))
-    state = np.zeros((s, K, n))
+    state, origin = np.zeros((s, K, n)), [np.eye(s)]
     A, G, C = (np.asarray(a)[0] for a in (data.A, data.G, data.C))
     for k in range(K):
         answer[k] = np.einsum("cs,skn->ckn", C[k], state)
@@ -115,26 +111,37 @@ def dense():
             state = np.einsum("st,tkn->skn", A[k], state)
             state[:, k] += G[k][:, :n]
             state[:, k + 1] += G[k][:, n:]
+            origin.append(A[k] @ origin[-1])
     covariance = np.einsum("kcin,ijn,ldjn->kcld", answer, forces, answer).reshape(K * c, K * c)
-    return data, disturbance, covariance + np.diag(np.tile(np.asarray(disturbance.noise) ** 2, K))
+    covariance += np.diag(np.tile(np.asarray(disturbance.noise) ** 2, K))
+    begun = np.stack([C[k] @ origin[k] for k in range(K)]).reshape(K * c, s) * np.asarray(data.spread)
+    return data, disturbance, covariance, covariance + begun @ begun.T
 
 
 def test_adjoint_recursion_is_the_double_sum_over_samples(dense):
-    data, disturbance, covariance = dense
-    weights = np.asarray(data.theta)[0].reshape(-1, 2)
-    np.testing.assert_allclose(carried(disturbance, data, data.theta), weights.T @ covariance @ weights, rtol=1e-10)
+    data, disturbance, covariance, _ = dense
+    weights = np.random.default_rng(8).standard_normal((12, 2))
+    found = carried(disturbance, data, jnp.asarray(weights.reshape(1, 6, 2, 2)))
+    np.testing.assert_allclose(found, weights.T @ covariance @ weights, rtol=1e-10)
 
 
 def test_restricted_likelihood_is_that_of_the_dense_covariance(dense):
-    data, disturbance, covariance = dense
-    e, theta, start = (np.asarray(a)[0].reshape(12, -1) for a in (data.residual, data.theta, data.start))
-    # initial states are random of unit variance, coefficients are not known at all
-    total = covariance + start @ start.T
+    data, disturbance, _, total = dense
+    rng = np.random.default_rng(9)
+    shown, pushed = rng.standard_normal((6, 2, 3)), rng.standard_normal((5, 3, 3))
+    # what a column does to the state reaches the channels through the system
+    seen, state = shown.copy(), np.zeros((3, 3))
+    for k in range(5):
+        state = np.asarray(data.A)[0, k] @ state + pushed[k]
+        seen[k + 1] += np.asarray(data.C)[0, k + 1] @ state
+    e, theta = seen.reshape(12, 3)[:, 0], seen.reshape(12, 3)[:, 1:]
+    # coefficients are not known at all
     inverse = np.linalg.inv(total)
     information = theta.T @ inverse @ theta
     left = inverse - inverse @ theta @ np.linalg.solve(information, theta.T @ inverse)
     expected = 0.5 * (np.linalg.slogdet(total)[1] + np.linalg.slogdet(information)[1] + (e.T @ left @ e).item())
-    np.testing.assert_allclose(restricted(disturbance, data), expected, rtol=1e-10)
+    columns = Columns(jnp.asarray(shown)[None], jnp.asarray(pushed)[None])
+    np.testing.assert_allclose(restricted(disturbance, data, columns, jnp.zeros((3, 3))), expected, rtol=1e-10)
 
 
 def test_coefficient_that_nothing_tells_keeps_an_error_without_bound_and_spoils_no_other(exact):

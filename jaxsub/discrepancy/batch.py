@@ -1,0 +1,22 @@
+"""Recordings as the batch that a vehicle takes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..recording import Recording
+from ..recording.runs import Runs, stack_runs
+from ..vehicle import AbstractVehicle
+
+
+def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
+    """The recordings as the batch that `vehicle` takes, with as many integration steps a sample as it needs."""
+    layout = vehicle.layout
+    rates = np.linalg.solve(np.asarray(vehicle.mass_matrix()), np.asarray(vehicle.damping_matrix()))
+    fastest = float(np.max(np.abs(np.linalg.eigvals(rates))))
+    longest = max(float(np.diff(r.times).max()) for r in recordings)
+    # linear damping is exact at any step; effects that replace it have the same rate and are not
+    substeps = int(np.clip(np.ceil(longest * fastest / 1.5), 1, 16))
+    return stack_runs(
+        recordings, held=layout.held, interpolated=layout.interpolated, channels=layout.channels, substeps=substeps
+    )

@@ -1,0 +1,155 @@
+r"""How probable the recordings are with some candidates in the model and under some disturbance.
+
+With whitened residual r, columns J of the free parameters and S of chosen candidates, amplitudes a of a Gaussian prior
+that is worth one sample ($\pi = 1/N$ in units of each column's length), what the data say is
+
+$-\ln p = \sum\ln|L| + \tfrac12\ln|A| - \tfrac12\sum\ln\pi + \tfrac12(r^Tr - b^TA^{-1}b),\quad
+A = [J\,S]^T[J\,S] + \text{priors},\; b = [J\,S]^Tr$
+
+(Kass and Wasserman 1995, J. Am. Stat. Assoc. 90). A is a block of one matrix of products of all columns, so any set of
+candidates costs a small Cholesky factor and no pass through the data. How large the disturbance is depends on what is
+in the model: what was left out looks like a disturbance until it is put in. So evidence is the largest over several
+disturbances, and a set that may win has its own estimated.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..estimate import estimate_disturbance
+from ..likelihood import Columns, Disturbance
+from .view import View, lengths, products
+
+# columns that a chosen set may have: the program for its disturbance then has one shape
+SLOTS = 8
+# shares of the disturbance that the model without candidates asks for: what was left out may be part or all of it
+_SHARES = (1.0, 0.1, 0.003)
+
+
+class Gains(NamedTuple):
+    """What each of some candidates would add: log evidence, χ² under "nothing left out", and its amplitudes."""
+
+    evidence: np.ndarray
+    statistic: np.ndarray
+    amplitudes: list[np.ndarray]
+
+
+@dataclasses.dataclass(frozen=True)
+class Products:
+    """Products of all columns under one disturbance.
+
+    **Fields**
+
+    - `gram`: (1 + p + q, 1 + p + q): residual, free parameters, candidates; priors of the first 1 + p included.
+    - `spread`: half the log-determinant of the residuals' covariance. `samples`: how many.
+    """
+
+    disturbance: Disturbance
+    gram: np.ndarray
+    spread: float
+    samples: int
+    known: int
+
+    def solve(self, chosen: Sequence[int]) -> tuple[float, np.ndarray, np.ndarray]:
+        """Log evidence with the candidate columns `chosen`, their amplitudes, and the amplitudes' covariance."""
+        index = [*range(1, self.known), *(self.known + c for c in chosen)]
+        A, b = self.gram[np.ix_(index, index)].copy(), self.gram[index, 0]
+        k = len(chosen)
+        A[-k:, -k:] += np.eye(k) / self.samples if k else 0.0
+        factor = np.linalg.cholesky(A)
+        half = np.linalg.solve(factor, b)
+        logarithm = float(np.sum(np.log(np.diag(factor))))
+        evidence = 0.5 * (half @ half - self.gram[0, 0]) - self.spread - logarithm - 0.5 * k * np.log(self.samples)
+        covariance = np.linalg.inv(A)
+        return evidence, (covariance @ b)[len(index) - k :], covariance[len(index) - k :, len(index) - k :]
+
+    def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> "Gains":
+        """What each further candidate would add to `chosen`."""
+        base = [*range(1, self.known), *(self.known + c for c in chosen)]
+        A, k = self.gram[np.ix_(base, base)].copy(), len(chosen)
+        A[len(base) - k :, len(base) - k :] += np.eye(k) / self.samples
+        rest = [0, *range(self.known, len(self.gram))]
+        mixed = self.gram[np.ix_(base, rest)]
+        left = self.gram[np.ix_(rest, rest)] - mixed.T @ np.linalg.solve(A, mixed)
+        evidence, statistic, sizes = [], [], []
+        for own in owners:
+            at = [1 + c for c in own]
+            block = left[np.ix_(at, at)] + np.eye(len(at)) / self.samples
+            amplitude = np.linalg.solve(block, left[at, 0])
+            occam = np.linalg.slogdet(block * self.samples)[1]
+            statistic.append(left[at, 0] @ amplitude)
+            evidence.append(0.5 * (statistic[-1] - occam))
+            sizes.append(amplitude)
+        return Gains(np.array(evidence), np.array(statistic), sizes)
+
+    def fall(self, chosen: Sequence[int]) -> float:
+        """By how much χ² falls with the candidate columns `chosen`."""
+        index = [*range(1, self.known), *(self.known + c for c in chosen)]
+        squares = lambda at: float(self.gram[at, 0] @ np.linalg.lstsq(self.gram[np.ix_(at, at)], self.gram[at, 0])[0])
+        return squares(index) - squares(index[: self.known - 1])
+
+    def kept(self, owners: Sequence[Sequence[int]]) -> np.ndarray:
+        """The share of each candidate's squares that the free parameters cannot absorb, the least over its columns."""
+        base = list(range(1, self.known))
+        rest = list(range(self.known, len(self.gram)))
+        mixed = self.gram[np.ix_(base, rest)]
+        own = np.diag(self.gram)[rest]
+        left = own - np.sum(mixed * np.linalg.solve(self.gram[np.ix_(base, base)], mixed), axis=0)
+        share = np.where(own > 0.0, left / np.maximum(own, 1e-300), 0.0)
+        return np.array([float(np.min(share[list(columns)])) for columns in owners])
+
+
+@dataclasses.dataclass(frozen=True)
+class Evidence:
+    """A view, the columns of all candidates in units of their length, and their products under several disturbances."""
+
+    view: View
+    columns: Columns
+    length: np.ndarray
+    products: list[Products]
+
+    @classmethod
+    def of(cls, view: View, columns: Columns, disturbances: Sequence[Disturbance] = ()) -> "Evidence":
+        """Under the given disturbances, or shares of the view's."""
+        length = lengths(view.disturbance, view.followed.system, columns)
+        scaled = jax.tree.map(lambda column: column / length, columns)
+        made = cls(view, scaled, np.asarray(length), [])
+        own = view.disturbance
+        shares = [dataclasses.replace(own, force=share * own.force) for share in _SHARES]
+        for disturbance in disturbances or shares:
+            made.products.append(made.under(disturbance))
+        return made
+
+    def under(self, disturbance: Disturbance) -> Products:
+        """The products under a disturbance."""
+        view = self.view
+        gram, spread = products(disturbance, view.followed.system, view.base + self.columns, view.prior)
+        samples = int(np.sum(np.asarray(self.view.followed.system.measured)))
+        return Products(disturbance, np.asarray(gram), float(spread), samples, len(self.view.prior))
+
+    def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
+        """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
+        picked = jax.tree.map(
+            lambda column: column[..., np.array([*chosen, *[0] * (SLOTS - len(chosen))])], self.columns
+        )
+        filled = jnp.arange(SLOTS) < len(chosen)
+        picked = jax.tree.map(lambda column: jnp.where(filled, column, 0.0), picked)
+        samples = float(np.sum(np.asarray(self.view.followed.system.measured)))
+        worth = jnp.where(filled, 1.0 / samples, 1.0)
+        prior = jax.scipy.linalg.block_diag(self.view.prior, jnp.diag(worth))
+        found = estimate_disturbance(self.view.followed.system, self.view.base + picked, prior, start)
+        return self.under(found)
+
+    def picked(self, chosen: Sequence[int]) -> Columns:
+        """Some of the columns."""
+        return jax.tree.map(lambda column: column[..., np.array(chosen, int)], self.columns)
+
+    def best(self, chosen: Sequence[int]) -> tuple[float, Products]:
+        """The largest log evidence of `chosen` over the disturbances, and the products where it is."""
+        values = [products.solve(chosen)[0] for products in self.products]
+        best = int(np.argmax(values))
+        return values[best], self.products[best]

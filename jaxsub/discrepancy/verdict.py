@@ -1,0 +1,69 @@
+"""What the evidence amounts to: none, named, ambiguous or unknown."""
+
+import dataclasses
+
+from .diagnosis import Location, Physics, Verdict
+from .generic import Pattern
+from .name import Named, Naming
+
+_CERTAIN = 0.9
+_EXPLAINED = 0.75
+# log evidence by which a force without a name must beat the names to stand instead of them
+_CLEARLY = 3.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Judged:
+    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader; whether the model improves."""
+
+    verdict: Verdict
+    named: list[Named]
+    p_value: float
+    notes: list[str]
+    improves: bool = False
+
+
+def judge(naming: Naming, pattern: Pattern | None) -> Judged:
+    """The verdict before anything was tried on the held-out runs."""
+    follows = pattern is not None and pattern.significant
+    least = naming.first_p if pattern is None or naming.named else min(naming.first_p, pattern.p_value)
+    p_value: float = min(1.0, 2.0 * least)
+    notes: list[str] = []
+    if pattern is not None and follows:
+        notes.append(f"{pattern.force.expression} is asked for in {pattern.force.equation}: {pattern.described}.")
+    if not naming.named:
+        return Judged("unknown" if follows else "none", [], p_value, notes)
+    labels = ", ".join(named.effect.label for named in naming.named)
+    if pattern is not None and follows and pattern.alone > naming.value + _CLEARLY:
+        notes.append(f"{labels} is the best of the vocabulary, and says less than a force without a name.")
+        return Judged("unknown", [], p_value, notes)
+    if pattern is not None and follows and pattern.explained < _EXPLAINED:
+        notes.append(f"{labels} would explain {pattern.explained:.0%} of the mismatch, too little for its cause.")
+        return Judged("unknown", [], p_value, notes)
+    verdict: Verdict = "named" if all(named.probability >= _CERTAIN for named in naming.named) else "ambiguous"
+    return Judged(verdict, naming.named, p_value, notes)
+
+
+def helped(judged: Judged, held_out: tuple[float, float]) -> Judged:
+    """The verdict once the gain in log likelihood of the held-out runs and its probability to be luck are known."""
+    gain, luck = held_out
+    said = f"The held-out runs gain {gain:.4g} in log likelihood; that this is luck has probability {luck:.2g}."
+    if gain > 0.0:
+        return dataclasses.replace(judged, notes=[*judged.notes, said], improves=True)
+    labels = ", ".join(named.effect.label for named in judged.named) or "a force without a name"
+    said = f"{labels} fitted the training runs better but the held-out runs worse, and is not accepted."
+    return dataclasses.replace(judged, verdict="unknown", named=[], notes=[*judged.notes, said])
+
+
+def summary(verdict: Verdict, physics: list[Physics], where: list[Location]) -> str:
+    """The verdict in one sentence."""
+    places = " and ".join(place.where for place in where[:2]) or "no equation"
+    names = ", then ".join(found.effect for found in physics)
+    if verdict == "none":
+        return "The model explains the recordings: nothing significant is left in the residuals."
+    if verdict == "named":
+        return f"The model leaves out {names}, felt in {places}; with it the held-out runs fit better."
+    if verdict == "ambiguous":
+        rivals = sorted({rival.effect for found in physics for rival in found.rivals})
+        return f"Something is missing in {places}: {names}, but these runs cannot tell it from {', '.join(rivals)}."
+    return f"Something is missing in {places}, and nothing in the vocabulary explains it."

@@ -1,0 +1,211 @@
+"""A fitted model as a filter of it follows its recordings: what every question about left-out physics is asked of."""
+
+import dataclasses
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..effects import Facts, Motion
+from ..estimate import Fit, Problem, estimate_disturbance
+from ..likelihood import Columns, Disturbance, Followed, System, first_guess, follow, whitened
+from ..recording.runs import Runs
+from ..vehicle import AbstractVehicle
+
+# rounds of following and estimating the disturbance: the path hardly depends on it; steps where it is known
+_ROUNDS, _STEPS = 2, 4
+# a direction of the coefficients that nothing tells, relative to one that one column tells alone
+_UNTOLD = 1e-7
+
+
+class Trajectory(eqx.Module):
+    """The motion that took place, as NumPy arrays: what effects are evaluated on.
+
+    NumPy on purpose: a force is a handful of array operations, so a vocabulary of any size costs no compilation.
+
+    **Fields**
+
+    - `start`, `end`: at both ends of every interval, (R, K-1): filtered, and what was expected from there.
+    - `seen`: at every sample, (R, K), as expected; `true`: (R, K) measured channels there, before any sensor effect.
+    - `nodes`: (R, K-1, 3, m) signals after the actuators, time last. `times`: (R, K) s; `steps`: (R, K-1) s, 0 where
+      padded.
+    """
+
+    start: Motion
+    end: Motion
+    seen: Motion
+    true: dict[str, np.ndarray]
+    nodes: np.ndarray
+    times: np.ndarray
+    steps: np.ndarray
+
+    @classmethod
+    def of(cls, vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered: Array) -> "Trajectory":
+        """Along states (R, K, s) expected and filtered."""
+        found = _trajectory(vehicle, runs, expected, filtered)
+        steps = jnp.where(runs.live, runs.steps[runs.step_of], 0.0)
+        return cls(*(jax.tree.map(np.asarray, part) for part in (*found, runs.times, steps)))
+
+
+@eqx.filter_jit
+def _trajectory(vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered: Array) -> tuple:
+    nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
+    start = vehicle.motion(filtered[:, :-1], nodes[:, :, 0])
+    end = vehicle.motion(expected[:, 1:], nodes[:, :, 2])
+    true, seen = vehicle.truth(runs.times, expected, runs.signals)
+    return start, end, seen, true, nodes
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """A model as its recordings lead it.
+
+    **Fields**
+
+    - `vehicle`: with the free numbers that innovations of least squares have. `covariance`: (p, p) theirs, physical.
+    - `runs`, `sigma`: the recordings and their noise, SI.
+    - `followed`: the runs as the model's filter followed them. `disturbance`: under which it did.
+    - `path`: its motion. `base`: the residual's column and those of the free parameters, each of unit length under
+      `disturbance`; `prior`: (p + 1, p + 1) of them.
+    """
+
+    vehicle: AbstractVehicle
+    covariance: np.ndarray
+    runs: Runs
+    sigma: Array
+    followed: Followed
+    disturbance: Disturbance
+    path: Trajectory
+    base: Columns
+    prior: Float[Array, "p1 p1"]
+
+
+def look(fit: Fit, disturbance: Disturbance | None = None) -> View:
+    """The view of a fit, its free numbers moved to where innovations are least.
+
+    The search for the disturbance starts from the given one, or from what the residuals ask.
+    """
+    led = _Led(fit, fit.problem)
+    vehicle = fit.vehicle
+    if disturbance is None:
+        system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
+        disturbance = first_guess(system, fit.residual)
+        for _ in range(_ROUNDS):
+            at = led.at(vehicle, disturbance)
+            disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance)
+            vehicle = led.descend(vehicle, disturbance, 1)
+    else:
+        vehicle = led.descend(vehicle, disturbance, _STEPS)
+        at = led.at(vehicle, disturbance)
+        disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance)
+        vehicle = led.descend(vehicle, disturbance, 1)
+    at = led.at(vehicle, disturbance)
+    path = Trajectory.of(vehicle, fit.runs, at.followed.expected, at.followed.filtered)
+    gram, _ = products(disturbance, at.followed.system, at.base, at.prior)
+    covariance = np.linalg.inv(np.asarray(gram)[1:, 1:]) / np.outer(at.length, at.length)
+    return View(vehicle, covariance, fit.runs, fit.sigma, at.followed, disturbance, path, at.base, at.prior)
+
+
+class _At(NamedTuple):
+    """The runs followed by a vehicle, its columns of unit length, their priors, and the lengths."""
+
+    followed: Followed
+    base: Columns
+    prior: Array
+    length: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class _Led:
+    """A fit's recordings, by which vehicles with other numbers are led."""
+
+    fit: Fit
+    problem: Problem
+
+    def at(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> _At:
+        """With the residual's and the parameters' columns in units in which each of the latter is of length one."""
+        fit, problem = self.fit, self.problem
+        followed = follow(vehicle, fit.runs, fit.sigma, disturbance, fit.start, problem.spread)
+        length = lengths(disturbance, followed.system, followed.theta)
+        scaled = jax.tree.map(lambda column: column / length, followed.theta)
+        values = vehicle.values()
+        away = problem.prior_mean - jnp.asarray([float(values[name]) for name in fit.names])
+        pulled = jnp.column_stack([away, jnp.diag(1.0 / length)]) / problem.prior_std[:, None]
+        untold = jnp.full(len(fit.names) + 1, _UNTOLD).at[0].set(0.0)
+        prior = pulled.T @ pulled + jnp.diag(untold)
+        return _At(followed, followed.residual + scaled, prior, np.asarray(length))
+
+    def descend(self, vehicle: AbstractVehicle, disturbance: Disturbance, steps: int) -> AbstractVehicle:
+        """So many scoring steps, halved where they do not make the recordings more probable."""
+        rows = vehicle.layout.free
+        here = np.array([float(vehicle.values()[row.name]) for row in rows])
+        step, before = np.zeros_like(here), np.inf
+        for _ in range(steps + 1):
+            inside = np.clip(here + step, [row.lower for row in rows], [row.upper for row in rows])
+            trial = vehicle.with_values({row.name: jnp.asarray(v) for row, v in zip(rows, inside, strict=True)})
+            at = self.at(trial, disturbance)
+            gram, spread = products(disturbance, at.followed.system, at.base, at.prior)
+            cost = 0.5 * float(gram[0, 0]) + float(spread)
+            if not cost < before:
+                step = 0.5 * step
+                continue
+            vehicle, here, before = trial, inside, cost
+            whole = np.asarray(gram)
+            step = np.linalg.solve(whole[1:, 1:], whole[1:, 0]) / at.length
+        return vehicle
+
+
+@eqx.filter_jit
+def products(
+    disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "b b"]
+) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
+    """Products of all columns whitened, the `prior` of the first b included; half the residuals' log-determinant."""
+    white, factor = whitened(disturbance, system, columns)
+    flat = white.reshape(-1, white.shape[-1])
+    b = len(prior)
+    return (flat.T @ flat).at[:b, :b].add(prior), jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)))
+
+
+@eqx.filter_jit
+def lengths(disturbance: Disturbance, system: System, columns: Columns) -> Float[Array, " q"]:
+    """The root of each column's whitened squares; one for an empty column."""
+    white, _ = whitened(disturbance, system, columns)
+    squares = jnp.sum(white**2, (0, 1, 2))
+    return jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
+
+
+def facts(view: View) -> Facts:
+    """What the vocabulary needs to know to list its candidates."""
+    layout, runs, path = view.vehicle.layout, view.runs, view.path
+    live, mask, outputs = np.asarray(runs.live), np.asarray(runs.mask), np.asarray(runs.outputs)
+    rms = lambda values: max(float(np.sqrt(np.mean(np.asarray(values)[live] ** 2))), 1e-9)
+    body = layout.kind == "submerged-body"
+    depth = np.asarray(path.seen.positions["z"]) if body else np.zeros(1)
+    shown = {c: outputs[..., i][mask[..., i]] for i, c in enumerate(layout.channels)}
+    return Facts(
+        layout.kind,
+        layout.equations,
+        tuple(name for name, _ in layout.inputs),
+        layout.channels,
+        tuple(name for name, _ in layout.environment),
+        layout.length,
+        layout.diameter,
+        {e: rms(path.start.rates[e]) for e in layout.equations},
+        float(np.median(path.steps[live])),
+        duration=float(np.max(np.sum(path.steps, axis=1))),
+        position_scale={} if body else {q: float(np.max(np.abs(path.seen.positions[q]))) for q in layout.equations},
+        input_range={name: _commanded(path, live, i) for i, (name, _) in enumerate(layout.inputs)},
+        output_range={c: (float(values.min()), float(values.max())) for c, values in shown.items() if len(values)},
+        depth_range=(float(depth.min()), float(depth.max())),
+    )
+
+
+def _commanded(path: Trajectory, live: np.ndarray, column: int) -> tuple[float, float, float]:
+    """Rms, largest size and largest rate of what an actuator does."""
+    command = path.nodes[:, :, 0, column]
+    turned = (np.abs(np.diff(command, axis=1)) / np.maximum(path.steps[:, :-1], 1e-9))[live[:, 1:]]
+    command = command[live]
+    return float(np.sqrt(np.mean(command**2))), float(np.max(np.abs(command))), float(np.max(turned, initial=0.0))

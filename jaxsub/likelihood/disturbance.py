@@ -1,0 +1,230 @@
+r"""A disturbance force in every equation, and how large and how slow the residuals say it is.
+
+Residuals of a vehicle are sums of its answers to forces that the model does not know: they are correlated over channels
+and time and, where a state integrates (heading, depth), not stationary. So they are not described as a series with an
+autocorrelation but as what the linearised model makes of first-order Gauss–Markov forces (Gelb 1974, ch. 2):
+
+$x_{k+1} = A_k x_k + G_k[d_k, d_{k+1}],\quad d_{k+1} = \rho_k d_k + q\sqrt{1-\rho_k^2}\,w_k,\quad
+\rho_k = e^{-\Delta_k/\tau},\quad e_k = C_k x_k + \kappa v_k$
+
+with q, τ of each equation and the white noise κ of each channel. They maximise the restricted likelihood (Patterson and
+Thompson 1971), which a Kalman filter of [x, d] gives: coefficients that are fitted to the same samples take up part of
+the disturbance, and the restricted likelihood allows for that.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.scipy.linalg import solve_triangular
+from jaxtyping import Array, Bool, Float
+
+from ..recording.runs import Runs
+from .sensitivity import Linearised, propagate
+
+
+class Disturbance(eqx.Module):
+    """First-order Gauss–Markov forces and white noise.
+
+    **Fields**
+
+    - `force`, `time`: (n,) standard deviation (N, N m) and time constant (s) of the force in each equation.
+    - `noise`: (c,) white noise of each channel, in units of the noise that the residuals were whitened with.
+    """
+
+    force: Float[Array, " n"]
+    time: Float[Array, " n"]
+    noise: Float[Array, " c"]
+
+
+class System(eqx.Module):
+    """A model linearised along R runs, s states, c channels in units of their noise, n equations.
+
+    **Fields**
+
+    - `A`: (R, K-1, s, s) of the step by the state. `G`: (R, K-1, s, 2n) by a force at its start and end.
+    - `C`: (R, K, c, s) of the channels by the state, zero where nothing was measured; `measured`: (R, K, c).
+    - `intervals`: (R, K-1) s. `spread`: (s,) prior standard deviation of the initial states.
+    """
+
+    A: Float[Array, "r k1 s s"]
+    G: Float[Array, "r k1 s n2"]
+    C: Float[Array, "r k c s"]
+    measured: Bool[Array, "r k c"]
+    intervals: Float[Array, "r k1"]
+    spread: Float[Array, " s"]
+
+    @classmethod
+    def of(cls, model: Linearised, runs: Runs, sigma: Float[Array, " c"], spread: Float[Array, " s"]) -> "System":
+        """A linearised model on `runs`, its channels in units of `sigma`."""
+        C = model.C * (runs.mask / sigma)[..., None]
+        return cls(model.A, model.G, C, runs.mask, runs.steps[runs.step_of], spread)
+
+
+class Columns(eqx.Module):
+    """What residuals are linear in, column by column; the residual itself is one.
+
+    **Fields**
+
+    A column is what it shows plus what the system makes of its forcing.
+
+    - `shown`: (R, K, c, q) in the channels, in units of their noise, zero where nothing was measured.
+    - `forcing`: (R, K-1, s, q) on the state in each step; None where `shown` holds that already.
+    """
+
+    shown: Float[Array, "r k c q"]
+    forcing: Float[Array, "r k1 s q"] | None = None
+
+    def __add__(self, other: "Columns") -> "Columns":
+        """Both, side by side; either may lack forcing only if the other does."""
+        side_by_side = lambda a, b: jnp.concatenate([a, b], axis=-1)
+        return jax.tree.map(side_by_side, self, other)
+
+
+def first_guess(system: System, residual: Float[Array, "r k c"]) -> Disturbance:
+    """Where to start looking: in each equation a force whose lasting effect is as large as the `residual`."""
+    n, (r, k1) = system.G.shape[3] // 2, system.intervals.shape
+    steady = system.G[..., :n] + system.G[..., n:]
+    response = system.C @ propagate(system.A, steady, jnp.zeros((r, system.A.shape[-1], n)))
+    effect = jnp.sqrt(jnp.sum(response**2, (0, 1, 2)))
+    length = jnp.max(jnp.sum(system.intervals, axis=1))
+    slow = jnp.sqrt(length * length / k1)
+    force = jnp.sqrt(jnp.sum(residual**2)) / jnp.where(effect > 0.0, effect, 1.0)
+    return Disturbance(force, jnp.full(n, slow), jnp.ones(residual.shape[2]))
+
+
+def restricted(
+    disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "p1 p1"]
+) -> Float[Array, ""]:
+    """Minus the logarithm of the restricted likelihood, up to its constant.
+
+    The first of the `columns` is the residual, the others are fitted to it; `prior` is the Gram matrix of the residual
+    and columns of their priors.
+    """
+    gram, spread = _gram(disturbance, system, columns, prior)
+    among = jnp.linalg.cholesky(gram[1:, 1:])
+    explained = solve_triangular(among, gram[1:, 0], lower=True)
+    return spread + jnp.sum(jnp.log(jnp.diagonal(among))) + 0.5 * (gram[0, 0] - explained @ explained)
+
+
+def fitted(
+    disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "p1 p1"]
+) -> Float[Array, " p1"]:
+    """One for the residual and for each other column minus the weight with which it is fitted to it."""
+    gram, _ = _gram(disturbance, system, columns, prior)
+    return jnp.concatenate([jnp.ones(1), -jnp.linalg.solve(gram[1:, 1:], gram[1:, 0])])
+
+
+def _gram(disturbance: Disturbance, system: System, columns: Columns, prior: Array) -> tuple[Array, Array]:
+    """Products of the whitened columns, the priors' included, and half the residuals' log-determinant."""
+    white, factor = whitened(disturbance, system, columns)
+    spread = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)))
+    return jnp.einsum("rkca,rkcb->ab", white, white) + prior, spread
+
+
+def whitened(
+    disturbance: Disturbance, system: System, columns: Columns
+) -> tuple[Float[Array, "r k c q"], Float[Array, "r k c c"]]:
+    """The innovations of every column, whitened, and the lower Cholesky factors of their covariance."""
+    F, B = transition(disturbance, system)
+    s, n = system.C.shape[-1], len(disturbance.force)
+    noise = jnp.where(system.measured, disturbance.noise, 1.0) ** 2
+
+    def step(carry: tuple[Array, Array], sample: tuple) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        P, X = carry
+        F, B, C, noise, shown, forcing = sample
+        across = C @ P[:s]
+        factor = jnp.linalg.cholesky(across[:, :s] @ C.T + jnp.diag(noise))
+        white = solve_triangular(factor, jnp.concatenate([shown - C @ X[:s], across], axis=1), lower=True)
+        error, gain = white[:, : shown.shape[1]], white[:, shown.shape[1] :]
+        P, X = F @ (P - gain.T @ gain) @ F.T + B @ B.T, F @ (X + gain.T @ error)
+        X = X if forcing is None else X.at[:s].add(-forcing)
+        return (P, X), (error, factor)
+
+    def run(*samples: Array | None) -> tuple[Array, Array]:
+        begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
+        carry = (begin, jnp.zeros((s + n, columns.shown.shape[-1])))
+        return jax.lax.scan(step, carry, samples)[1]
+
+    last = lambda M: jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
+    forcing = None if columns.forcing is None else last(columns.forcing)
+    return jax.vmap(run)(last(F), last(B), system.C, noise, columns.shown, forcing)
+
+
+def transition(disturbance: Disturbance, system: System) -> tuple[Float[Array, "r k1 z z"], Float[Array, "r k1 z n"]]:
+    """F and B of z ← F z + B w for z = [x, d]."""
+    s, n = system.A.shape[-1], len(disturbance.force)
+    rho = jnp.exp(-system.intervals[..., None] / disturbance.time)
+    fresh = disturbance.force * jnp.sqrt(1.0 - rho**2)
+    begin, end = system.G[..., :n], system.G[..., n:]
+    empty = jnp.zeros((*system.intervals.shape, s + n, s + n))
+    diagonal = jnp.eye(n) * rho[..., None]
+    F = empty.at[..., :s, :s].set(system.A).at[..., :s, s:].set(begin + end * rho[..., None, :])
+    B = jnp.concatenate([end, jnp.broadcast_to(jnp.eye(n), diagonal.shape)], axis=-2) * fresh[..., None, :]
+    return F.at[..., s:, s:].set(diagonal), B
+
+
+def carried(disturbance: Disturbance, system: System, weights: Float[Array, "r k c p"]) -> Float[Array, "p p"]:
+    r"""$\sum_r W_r^T\Gamma_r W_r$ with $\Gamma$ the residuals' covariance under `disturbance`, initial states known.
+
+    By the adjoint recursion, one pass backwards through each run, instead of a sum over all pairs of samples.
+    """
+
+    def run(F: Array, B: Array, C: Array, measured: Array, W: Array) -> Array:
+        s = C.shape[-1]
+        shown = jnp.einsum("kcs,kcp->ksp", C, W)
+
+        def back(adjoint: Array, step: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+            F, B, shown = step
+            return (F.T @ adjoint).at[:s].add(shown), B.T @ adjoint
+
+        last = jnp.zeros((F.shape[1], W.shape[-1])).at[:s].set(shown[-1])
+        first, pushes = jax.lax.scan(back, last, (F, B, shown[:-1]), reverse=True)
+        begun = disturbance.force[:, None] * first[s:]
+        white = jnp.where(measured, disturbance.noise, 1.0)[..., None] * W
+        gram = lambda columns: jnp.einsum("...a,...b->ab", columns, columns)
+        return gram(pushes) + gram(begun) + gram(white)
+
+    F, B = transition(disturbance, system)
+    return jnp.sum(jax.vmap(run)(F, B, system.C, system.measured, weights), axis=0)
+
+
+@eqx.filter_jit
+def smoothed(
+    disturbance: Disturbance, system: System, column: Columns
+) -> tuple[Float[Array, "r k n"], Float[Array, "r k n"]]:
+    """The disturbance force (N, N m) that one `column` asks for given all of its samples, and its standard deviation.
+
+    The adjoint form of the smoother, which inverts no covariance of the state. Source: Bierman (1973), Automatica 9.
+    """
+    F, B = transition(disturbance, system)
+    s, n = system.C.shape[-1], len(disturbance.force)
+    C = jnp.concatenate([system.C, jnp.zeros((*system.C.shape[:3], n))], axis=-1)
+    noise = jnp.where(system.measured, disturbance.noise, 1.0) ** 2
+
+    def forth(carry: tuple[Array, Array], sample: tuple) -> tuple[tuple[Array, Array], tuple]:
+        m, P = carry
+        F, B, C, noise, shown, forcing = sample
+        inverse = jnp.linalg.inv(C @ P @ C.T + jnp.diag(noise))
+        error = shown[:, 0] - C @ m
+        gain = P @ C.T @ inverse
+        after = (F @ (m + gain @ error)).at[:s].add(-forcing[:, 0]), F @ (P - gain @ C @ P) @ F.T + B @ B.T
+        known = C.T @ inverse
+        return after, (m, P, known @ C, known @ error, jnp.eye(s + n) - gain @ C, F)
+
+    def back(carry: tuple[Array, Array], kept: tuple) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        lever, weight = carry
+        m, P, told, pull, left, F = kept
+        through = left.T @ F.T
+        lever, weight = through @ lever - pull, told + through @ weight @ through.T
+        mean, spread = m - P @ lever, jnp.diag(P - P @ weight @ P)
+        return (lever, weight), (mean[s:], jnp.sqrt(jnp.maximum(spread[s:], 0.0)))
+
+    def run(*samples: Array) -> tuple[Array, Array]:
+        begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
+        _, kept = jax.lax.scan(forth, (jnp.zeros(s + n), begin), samples)
+        nothing = jnp.zeros(s + n), jnp.zeros((s + n, s + n))
+        return jax.lax.scan(back, nothing, kept, reverse=True)[1]
+
+    last = lambda M: jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
+    assert column.forcing is not None
+    return jax.vmap(run)(last(F), last(B), C, noise, column.shown, last(column.forcing))

@@ -1,0 +1,140 @@
+r"""A model that is led along its recordings: what it expects next, given all that was measured before.
+
+An extended Kalman filter of [x, d], d a first-order Gauss–Markov force in each equation, follows every run. What it
+expects lies near the truth even where the model misses much, so that whatever is evaluated along its path — the
+Jacobians, and the forces of physics that may have been left out — is evaluated at the motion that took place and not
+at one to which missing forces drove a free-running model. The forces at a filtered state act on the next sample, and
+sensors are looked at through the state that was expected: regressors that know nothing of the noise that they are held
+against, so that innovations and columns are independent where the model is right.
+
+Source: Åström (1980), Automatica 16, prediction errors; design.md.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.scipy.linalg import cho_solve
+from jaxtyping import Array, Float
+
+from ..effects import AbstractSensor
+from ..recording.runs import Runs
+from ..simulate import Sampled
+from ..vehicle import AbstractVehicle
+from .disturbance import Columns, Disturbance, System
+from .sensitivity import jacobians
+
+
+class Followed(eqx.Module):
+    """R runs as a filter of a model followed them, linearised along its path.
+
+    **Fields**
+
+    - `expected`: (R, K, s) states before, `filtered`: (R, K, s) after each sample was seen.
+    - `force`: (R, K, n) the disturbance force (N, N m) after each sample.
+    - `system`: linearised, steps at the filtered and outputs at the expected states.
+    - `residual`: one column, the measured outputs less those expected, and what led the path away from a free run.
+    - `theta`: p columns, by the free parameters.
+    """
+
+    expected: Float[Array, "r k s"]
+    filtered: Float[Array, "r k s"]
+    force: Float[Array, "r k n"]
+    system: System
+    residual: Columns
+    theta: Columns
+
+
+@eqx.filter_jit
+def follow(
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    sigma: Float[Array, " c"],
+    disturbance: Disturbance,
+    start: Float[Array, "r s"],
+    spread: Float[Array, " s"],
+) -> Followed:
+    """`vehicle` led along `runs` from initial states of mean `start` and standard deviation `spread`.
+
+    `sigma` is the noise of the channels, SI, in whose units the columns are.
+    """
+    expected, filtered, force = _path(vehicle, runs, sigma, disturbance, start, spread)
+    kept = jnp.exp(-runs.steps[runs.step_of][..., None] / disturbance.time) * force[:, :-1]
+    push = jnp.stack([force[:, :-1], kept], axis=2)
+    by = jacobians(vehicle, runs, filtered[:, :-1], expected, push)
+    shown = (runs.mask / sigma)[..., None]
+    intervals = runs.steps[runs.step_of]
+    system = System(by.A, by.G, by.C * shown, runs.mask, intervals, spread)
+    error = vehicle.deviation(runs.outputs, vehicle.measure(runs.times, expected, runs.signals))
+    # the path was led by its corrections and by the force; a free path from the expected state would not have been
+    led = jnp.einsum("rkst,rkt->rks", by.A, (filtered - expected)[:, :-1])
+    led += jnp.einsum("rksn,rkn->rks", by.G, push.reshape(*push.shape[:2], -1))
+    residual = Columns(jnp.where(runs.mask, error / sigma, 0.0)[..., None], led[..., None])
+    theta = Columns(jnp.where(runs.mask[..., None], by.direct / sigma[:, None], 0.0), by.F)
+    return Followed(expected, filtered, force, system, residual, theta)
+
+
+def _path(
+    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, spread: Array
+) -> tuple[Float[Array, "r k s"], Float[Array, "r k s"], Float[Array, "r k n"]]:
+    """Expected and filtered states, and filtered forces."""
+    vehicle, outputs = _prompt(vehicle, runs)
+    sampled = Sampled.of(vehicle, runs)
+    nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
+    s, n = start.shape[1], len(disturbance.force)
+    noise = (sigma * disturbance.noise) ** 2
+
+    def correct(m: Array, P: Array, seen: tuple[Array, ...]) -> tuple[Array, Array]:
+        time, signals, outputs, mask = seen
+        show = lambda x: vehicle.measure(time, x, signals)
+        C = jnp.where(mask[:, None], jax.jacfwd(show)(m[:s]), 0.0)
+        error = jnp.where(mask, vehicle.deviation(outputs, show(m[:s])), 0.0)
+        across = C @ P[:s]
+        S = across[:, :s] @ C.T + jnp.diag(jnp.where(mask, noise, 1.0))
+        gain = cho_solve((jnp.linalg.cholesky(S), True), across).T
+        return m + gain @ error, P - gain @ across
+
+    def predict(m: Array, P: Array, node: Array, index: Array, live: Array) -> tuple[Array, Array]:
+        interval = runs.steps[index]
+        rho = jnp.exp(-interval / disturbance.time)
+        fresh = disturbance.force * jnp.sqrt(1.0 - rho**2)
+
+        def step(z: Array) -> Array:
+            x, begin, end = jnp.split(z, [s, s + n])
+            return sampled.step(x, node, index, jnp.stack([begin, end]))
+
+        at = jnp.concatenate([m, rho * m[s:]])
+        moved, push = jax.linearize(step, at)
+        by = jax.vmap(push, out_axes=-1)(jnp.eye(len(at), dtype=at.dtype))
+        A, begin, end = by[:, :s], by[:, s : s + n], by[:, s + n :]
+        F = jnp.block([[A, begin + end * rho], [jnp.zeros((n, s)), jnp.diag(rho)]])
+        B = jnp.concatenate([end, jnp.eye(n)]) * fresh
+        after = jnp.concatenate([moved, rho * m[s:]]), F @ P @ F.T + B @ B.T
+        return jax.tree.map(lambda new, old: jnp.where(live, new, old), after, (m, P))
+
+    def advance(carry: tuple[Array, Array], sample: tuple) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        seen, moving = sample
+        m, P = correct(*carry, seen)
+        return predict(m, P, *moving), (carry[0], m)
+
+    def run(begin: Array, *samples: Array) -> tuple[Array, Array]:
+        seen, moving = samples[:4], samples[4:]
+        # an interval after the last sample, so that one loop serves all; it leads nowhere
+        moving = tuple(jnp.concatenate([a, a[-1:]]) for a in moving)
+        m = jnp.concatenate([begin, jnp.zeros(n)])
+        P = jnp.diag(jnp.concatenate([spread, disturbance.force]) ** 2)
+        return jax.lax.scan(advance, (m, P), (seen, moving))[1]
+
+    seen = (runs.times, runs.signals, outputs, runs.mask)
+    expected, filtered = jax.vmap(run)(start, *seen, nodes, runs.step_of, runs.live)
+    return expected[..., :s], filtered[..., :s], filtered[..., s:]
+
+
+def _prompt(vehicle: AbstractVehicle, runs: Runs) -> tuple[AbstractVehicle, Float[Array, "r k c"]]:
+    """A vehicle without sensors that show the past, which a filter does not keep, and outputs as if it had none."""
+    outputs = runs.outputs
+    for effect in vehicle.effects:
+        if isinstance(effect, AbstractSensor) and effect.remembers:
+            column = vehicle.layout.channels.index(effect.channel)
+            outputs = outputs.at[..., column].set(jax.vmap(effect.undone)(runs.times, outputs[..., column]))
+            vehicle = vehicle.without_effect(effect.label)
+    return vehicle, outputs

@@ -1,0 +1,110 @@
+"""Evidence is the Gaussian integral that it claims to be, χ² under the null, and largest for what was concealed."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from diagnosis_cases import recorded, wrong
+from scipy import stats
+
+from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.columns import candidate_columns
+from jaxsub.discrepancy.evidence import Evidence, Products
+from jaxsub.discrepancy.name import Selector, select
+from jaxsub.discrepancy.view import facts, look
+from jaxsub.effects import candidates
+from jaxsub.effects.hull import CrossflowDrag
+from jaxsub.effects.sensors import SensorScale
+from jaxsub.estimate import fit
+from jaxsub.likelihood import Disturbance, whitened
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return look(fit(wrong(), batch(wrong(), recorded(None, 1)[:2])))
+
+
+@pytest.fixture(scope="module")
+def dense():
+    """Random whitened columns: a residual, three free parameters and five candidates, and priors of the parameters."""
+    rng = np.random.default_rng(0)
+    W = rng.standard_normal((40, 9))
+    W[:, 0] += 0.8 * W[:, 5]
+    prior = np.diag([0.0, 0.3, 0.2, 0.1])
+    gram = W.T @ W
+    gram[:4, :4] += prior
+    return W, prior, Products(Disturbance(*jnp.ones((3, 1))), gram, 0.7, 40, 4)
+
+
+def log_evidence(W, prior, chosen):
+    """By the covariance of the data: amplitudes of prior variance N, parameters of their own."""
+    J, S = W[:, 1:4], W[:, [4 + c for c in chosen]]
+    covariance = np.eye(40) + J @ np.diag(1.0 / np.diag(prior)[1:]) @ J.T + 40.0 * S @ S.T
+    whole = stats.multivariate_normal(np.zeros(40), covariance).logpdf(W[:, 0])
+    # what neither the candidates nor the data change
+    constant = -20.0 * np.log(2.0 * np.pi) + 0.5 * np.sum(np.log(np.diag(prior)[1:]))
+    return whole - constant - 0.7
+
+
+@pytest.mark.parametrize("chosen", [[], [1], [0, 3], [1, 2, 4]])
+def test_it_is_the_integral_over_all_amplitudes(dense, chosen):
+    W, prior, products = dense
+    np.testing.assert_allclose(products.solve(chosen)[0], log_evidence(W, prior, chosen), rtol=1e-10)
+
+
+def test_gains_on_top_of_chosen_ones_are_differences_of_evidence(dense):
+    W, prior, products = dense
+    gains = products.gains([1], [[0], [2, 3], [4]])
+    expected = [log_evidence(W, prior, [1, *own]) - log_evidence(W, prior, [1]) for own in ([0], [2, 3], [4])]
+    np.testing.assert_allclose(gains.evidence, expected, rtol=1e-9)
+
+
+def test_statistic_is_chi_square_where_nothing_is_left_out(clean):
+    effects = [e for e in candidates(facts(clean)) if e.family in ("hull", "hydrostatics", "sensors")]
+    columns, owners = candidate_columns(clean, effects)
+    base = clean.base + columns
+    white = np.array(whitened(clean.disturbance, clean.followed.system, base)[0]).reshape(-1, base.shown.shape[-1])
+    measured = np.asarray(clean.followed.system.measured).ravel()
+    rng, draws = np.random.default_rng(2), []
+    for _ in range(60):
+        white[:, 0] = rng.standard_normal(len(white)) * measured
+        gram = white.T @ white
+        gram[: len(clean.prior), : len(clean.prior)] += np.asarray(clean.prior)
+        products = Products(clean.disturbance, gram, 0.0, int(measured.sum()), len(clean.prior))
+        single = [own for own in owners if len(own) == 1]
+        kept = products.kept(single)
+        draws.append(products.gains([], single).statistic[kept > 1e-3])
+    values = np.array(draws)
+    assert values.shape[1] > 8
+    assert abs(values.mean() - 1.0) < 0.2
+    assert abs(np.mean(values > stats.chi2.ppf(0.95, 1)) - 0.05) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("effect", "field", "tolerance"),
+    [(CrossflowDrag("vertical", 5.0, 0.761, 0.3), "C_d", 0.25), (SensorScale("q", 0.05), "scale", 0.15)],
+)
+def test_the_concealed_effect_comes_first_with_its_amplitude(effect, field, tolerance):
+    view = look(fit(wrong(), batch(wrong(), recorded(effect, 2)[:2])))
+    tried = candidates(facts(view))
+    columns, owners = candidate_columns(view, tried)
+    selector = Selector(Evidence.of(view, columns), tried, owners)
+    chosen, scans, p_values = select(selector, lambda message: None)
+    assert [tried[i].name for i in chosen] == [effect.name]
+    assert p_values[0] < 1e-6 < 0.01 < p_values[1]
+    truth = float(getattr(effect, field))
+    assert abs(float(getattr(scans[0].effects[chosen[0]], field)) / truth - 1.0) < tolerance
+
+
+def test_wrong_scale_of_the_noise_raises_no_alarm():
+    quiet = wrong()
+    rows = tuple(dataclasses.replace(o, sigma=0.5 * (o.sigma or 1.0)) for o in quiet.layout.outputs)
+    quiet = dataclasses.replace(quiet, layout=dataclasses.replace(quiet.layout, outputs=rows))
+    view = look(fit(quiet, batch(quiet, recorded(None, 1)[:2])))
+    np.testing.assert_allclose(view.disturbance.noise, 2.0, rtol=0.15)
+    tried = candidates(facts(view))
+    columns, owners = candidate_columns(view, tried)
+    chosen, _, p_values = select(Selector(Evidence.of(view, columns), tried, owners), lambda message: None)
+    assert chosen == [] and p_values[0] > 0.01
+    assert jnp.isfinite(view.covariance).all()
