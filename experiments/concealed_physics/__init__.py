@@ -1,0 +1,1 @@
+"""Is what was concealed found again? A generator that knows the truth, and a judge that sees files alone."""

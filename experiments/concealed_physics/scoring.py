@@ -1,0 +1,114 @@
+"""What counts as right, from a line that holds a case's truth and an answer to it."""
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+
+MOST_RIVALS = 4
+EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0)
+
+
+def wilson(count: int, of: int, z: float = 1.96) -> list[float] | None:
+    """The 95 % Wilson score interval of a share; None where there were no trials."""
+    if not of:
+        return None
+    share, spread = count / of, z * z / of
+    centre = (share + spread / 2.0) / (1.0 + spread)
+    half = z / (1.0 + spread) * math.sqrt(share * (1.0 - share) / of + spread / (4.0 * of))
+    return [max(0.0, centre - half), min(1.0, centre + half)]
+
+
+def rate(hits: Iterable[bool]) -> dict:
+    """A share with its interval."""
+    hits = list(hits)
+    return {"rate": sum(hits) / len(hits) if hits else None, "n": len(hits), "interval": wilson(sum(hits), len(hits))}
+
+
+def offered(entry: dict, verdict: str) -> list[str]:
+    """The names that an accepted entry puts forward: its own and, where the answer is `ambiguous`, its rivals'."""
+    if verdict != "ambiguous":
+        return [entry["effect"]]
+    return list(dict.fromkeys([entry["effect"], *(name for name, _ in entry["rivals"])]))
+
+
+def right(names: Sequence[str], answer: dict) -> bool:
+    """Whether `answer` names all of `names` and nothing else, or puts each among at most four rivals.
+
+    With nothing concealed the right answer is `none`; for what the vocabulary lacks it is `unknown`.
+    """
+    verdict = answer.get("verdict")
+    if not names:
+        return verdict == "none"
+    if any(name.startswith("outside") for name in names):
+        return verdict == "unknown"
+    if verdict not in ("named", "ambiguous"):
+        return False
+    sets = [offered(entry, verdict) for entry in answer["physics"]]
+    # forms of one effect count once
+    distinct = {tuple(sorted(s)) for s in sets}
+    return len(distinct) == len(set(names)) and _matched(list(dict.fromkeys(names)), list(distinct))
+
+
+def _matched(names: list[str], sets: list[tuple[str, ...]]) -> bool:
+    """Whether every name has an entry of its own that puts it forward, in some order."""
+    if not names:
+        return True
+    fits = [i for i, s in enumerate(sets) if names[0] in s and len(s) <= MOST_RIVALS]
+    return any(_matched(names[1:], sets[:i] + sets[i + 1 :]) for i in fits)
+
+
+def among(names: Sequence[str], answer: dict) -> bool:
+    """Whether every name is put forward by some entry, whatever else is."""
+    if answer.get("verdict") not in ("named", "ambiguous"):
+        return False
+    seen = {name for entry in answer["physics"] for name in offered(entry, answer["verdict"])}
+    return set(names) <= seen
+
+
+def first_place(places: Sequence[Sequence[str]], answer: dict) -> bool:
+    """Whether the first place that the answer gives is one where any concealed effect acts."""
+    where = answer.get("where") or []
+    return bool(where) and any(where[0] in listed for listed in places)
+
+
+def forecasts(names: Sequence[str], answer: dict) -> list[tuple[float, bool]]:
+    """Every (stated probability, whether it is true) of an answer: of entries, and of their rivals."""
+    found = []
+    for entry in answer.get("physics", []):
+        if entry["probability"] is not None:
+            named = dict(entry["rivals"]) | {entry["effect"]: entry["probability"]}
+            found += [(probability, name in names) for name, probability in named.items()]
+    return found
+
+
+def calibration(pairs: Sequence[tuple[float, bool]]) -> list[dict]:
+    """Mean stated probability beside the observed share, by bin."""
+    bins = []
+    for low, high in itertools.pairwise(EDGES):
+        inside = [(p, hit) for p, hit in pairs if low <= p < high or (high == 1.0 and p >= high)]
+        if inside:
+            stated = sum(p for p, _ in inside) / len(inside)
+            bins.append({"stated": stated, **rate(hit for _, hit in inside)})
+    return bins
+
+
+def covered(numbers: Sequence[dict], names: Sequence[str], answer: dict) -> list[bool]:
+    """For each true number that a rightly named entry estimates: whether its 95 % interval holds it."""
+    found = []
+    for name, true in zip(names, numbers, strict=True):
+        for entry in answer.get("physics", []):
+            if entry["effect"] == name:
+                shared = [symbol for symbol in true if symbol in entry["parameters"]]
+                for symbol in shared:
+                    value, error = entry["parameters"][symbol]
+                    found.append(abs(value - true[symbol]) <= 1.96 * error)
+    return found
+
+
+def held_out(answer: dict, floor: dict) -> dict | None:
+    """rms over channels of rms/σ on the held-out run: before, after, and with the true model."""
+    if "held_out" not in answer or not floor:
+        return None
+    overall = lambda by: math.sqrt(sum(by[c] ** 2 for c in floor) / len(floor))
+    before, after = answer["held_out"]["baseline"], answer["held_out"]["improved"]
+    return {"before": overall(before), "after": overall(after), "floor": overall(floor)}
