@@ -55,12 +55,15 @@ def identify(vehicle: Path, runs: tuple[Path, ...], out: Path, method: str, over
 @_runs
 @_out(required=True)
 @click.option("--hold-out", type=_PATH, multiple=True, help="A run to judge by and not to fit; repeatable.")
+@click.option("--effects", type=_PATH, help="A Python script with effects of your own, to be tried too.")
 @_overwrite
-def diagnose(vehicle: Path, runs: tuple[Path, ...], out: Path, hold_out: tuple[Path, ...], overwrite: bool) -> None:
+def diagnose(
+    vehicle: Path, runs: tuple[Path, ...], out: Path, hold_out: tuple[Path, ...], effects: Path | None, overwrite: bool
+) -> None:
     """Fit, locate the mismatch, name the missing physics, model it, and show it on held-out runs."""
     from . import diagnose as command
 
-    command.run(vehicle, runs, hold_out, out, overwrite)
+    command.run(vehicle, runs, hold_out, out, overwrite, effects)
 
 
 @app.command()

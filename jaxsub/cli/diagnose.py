@@ -9,6 +9,7 @@ from rich.text import Text
 
 from ..discrepancy import Diagnosis
 from ..discrepancy import diagnose as diagnose_runs
+from ..effects import AbstractEffect, from_script, vocabulary
 from ..recording import Recording, hold_out
 from ..report import write_report
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
@@ -16,24 +17,39 @@ from . import session
 from .output import fresh_folder, refuse_existing
 
 
-def run(vehicle_path: Path, runs: Sequence[Path], held: Sequence[Path], out: Path, overwrite: bool) -> None:
-    """Diagnose the recordings at `runs`, judged on those at `held` or on what `hold_out` sets aside."""
+def run(
+    vehicle_path: Path,
+    runs: Sequence[Path],
+    held: Sequence[Path],
+    out: Path,
+    overwrite: bool,
+    script: Path | None = None,
+) -> None:
+    """Diagnose the recordings at `runs`, judged on those at `held` or on what `hold_out` sets aside.
+
+    Effects that the Python file at `script` defines are tried with those that are installed.
+    """
     session.start()
     refuse_existing(out, overwrite)
-    vehicle = read_vehicle(vehicle_path)
+    own = () if script is None else from_script(script)
+    vehicle = read_vehicle(vehicle_path, own)
     recordings = session.load_runs(runs, vehicle)
     train, judged = (recordings, session.load_runs(held, vehicle)) if held else hold_out(recordings)
     with fresh_folder(out, overwrite) as folder:
-        diagnosis = write_diagnosis(vehicle, train, judged, folder)
+        diagnosis = write_diagnosis(vehicle, train, judged, folder, (*vocabulary(), *own))
     show(diagnosis, out)
 
 
 def write_diagnosis(
-    vehicle: AbstractVehicle, train: Sequence[Recording], held: Sequence[Recording], folder: Path
+    vehicle: AbstractVehicle,
+    train: Sequence[Recording],
+    held: Sequence[Recording],
+    folder: Path,
+    kinds: tuple[type[AbstractEffect], ...] | None = None,
 ) -> Diagnosis:
     """Diagnose, and write `diagnosis.json`, `improved.toml`, `report.html` and `figures/` into `folder`."""
     with session.progress(f"diagnosing {vehicle.layout.name}") as told:
-        diagnosis, improved = diagnose_runs(vehicle, train, held, progress=told)
+        diagnosis, improved = diagnose_runs(vehicle, train, held, vocabulary=kinds, progress=told)
         told("writing the report")
         text = vehicle_text(improved, f"{vehicle.layout.name}, improved by jaxsub\n{diagnosis.summary}")
         (folder / "improved.toml").write_text(text, encoding="utf-8")

@@ -4,12 +4,14 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Array
 
 from ..effects import AbstractEffect, candidates
 from ..errors import InputError
 from ..estimate import Fit, fit
 from ..likelihood import Disturbance
 from ..recording import Recording
+from ..recording.runs import Runs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .advice import next_manoeuvre
@@ -19,11 +21,11 @@ from .diagnosis import Diagnosis, Location, Physics, Rival
 from .evidence import Evidence
 from .generic import Pattern, pattern
 from .locate import Field, effect_shares, locations, shares, traces
-from .model import join, settle
+from .model import allowing_for, join
 from .name import Named, Naming, Selector, name
 from .process_noise import noise_note, noise_signals
 from .progress import Progress
-from .show import channel_quality, coefficients, estimates, hold, luck, overlays, run_quality
+from .show import HeldOut, channel_quality, coefficients, estimates, hold, luck, overlays, run_quality
 from .verdict import Judged, helped, judge, summary
 from .view import View, facts, look
 
@@ -66,23 +68,25 @@ def diagnose(
     share = shares(view, naming.first, candidates(facts(view), vocabulary))
     field = Field(share, traces(view, train), signals)
     progress("free runs through what the fit did not see")
-    held_out = lambda model, disturbance: hold(model.vehicle, runs, chosen, size, start.sigma, disturbance)
-    baseline, _ = settle(start, view)
-    before = held_out(baseline, view.disturbance)
-    judged = judge(found.naming, found.pattern)
+    trial = Trial(runs, chosen, size, start.sigma)
+    before = trial.held_out(start, view.disturbance)
+    judged = judge(naming, found.pattern)
     added: list[AbstractEffect] = [named.effect for named in judged.named]
     if judged.verdict == "unknown" and found.pattern is not None and found.pattern.significant:
         added = [found.pattern.force]
-    improved, after, remaining = baseline, before, view
-    if added:
+    improved, after, remaining = start, before, view
+    # what fails on runs that were not fitted loses its last effect: the first explain most and stand most firmly
+    while added and not judged.improves:
         progress(f"fitting with {', '.join(effect.label for effect in added)}")
-        joined, remaining = join(view, start, added, naming.products.disturbance)
-        seen_later = held_out(joined, remaining.disturbance)
-        judged = helped(judged, luck(before, seen_later))
+        joined = join(view, start, added)
+        seen_there = look(joined, naming.products.disturbance)
+        shown = trial.held_out(joined, seen_there.disturbance)
+        judged = helped(judged, added, luck(before, shown))
         if judged.improves:
-            improved, after = joined, seen_later
-        else:
-            remaining = view
+            improved, after, remaining = joined, shown, seen_there
+        added = added[:-1]
+    baseline = allowing_for(view, start)
+    improved = baseline if improved is start else allowing_for(remaining, improved)
     where = _where(judged, found, field, train)
     physics = [_physics(named, improved) for named in judged.named]
     diagnosis = Diagnosis(
@@ -111,6 +115,20 @@ def diagnose(
         ],
     )
     return diagnosis, improved.vehicle
+
+
+@dataclasses.dataclass(frozen=True)
+class Trial:
+    """The runs that no fit saw: numbers `chosen` of `runs`, of which the first `size` were fitted."""
+
+    runs: Runs
+    chosen: Sequence[int]
+    size: int
+    sigma: Array
+
+    def held_out(self, fit: Fit, disturbance: Disturbance) -> HeldOut:
+        """A fit's vehicle on them."""
+        return hold(fit.vehicle, self.runs, self.chosen, self.size, self.sigma, disturbance)
 
 
 def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:

@@ -22,10 +22,12 @@ import numpy as np
 
 from ..estimate import estimate_disturbance
 from ..likelihood import Columns, Disturbance
-from .view import View, lengths, products
+from .view import View, block_products, lengths
 
 # columns that a chosen set may have: the program for its disturbance then has one shape
 SLOTS = 8
+# parts of the recordings, each to be predicted from the others
+_PARTS = 4
 # shares of the disturbance that the model without candidates asks for: what was left out may be part or all of it
 _SHARES = (1.0, 0.1, 0.003)
 
@@ -45,6 +47,7 @@ class Products:
     **Fields**
 
     - `gram`: (1 + p + q, 1 + p + q): residual, free parameters, candidates; priors of the first 1 + p included.
+    - `parts`: (m, 1 + p + q, 1 + p + q) of it in m parts of the recordings, priors apart.
     - `spread`: half the log-determinant of the residuals' covariance. `samples`: how many.
     """
 
@@ -53,6 +56,19 @@ class Products:
     spread: float
     samples: int
     known: int
+    parts: np.ndarray
+
+    def predicted(self, chosen: Sequence[int]) -> float:
+        """Log likelihood of each part of the recordings, amplitudes and parameters those that the others ask for."""
+        index = [*range(1, self.known), *(self.known + c for c in chosen)]
+        k, total = len(chosen), 0.0
+        for part in self.parts:
+            rest = self.gram - part
+            A = rest[np.ix_(index, index)]
+            A[len(index) - k :, len(index) - k :] += np.eye(k) / self.samples
+            w = np.linalg.solve(A, rest[index, 0])
+            total -= 0.5 * float(part[0, 0] - 2.0 * w @ part[index, 0] + w @ part[np.ix_(index, index)] @ w)
+        return total - self.spread
 
     def solve(self, chosen: Sequence[int]) -> tuple[float, np.ndarray, np.ndarray]:
         """Log evidence with the candidate columns `chosen`, their amplitudes, and the amplitudes' covariance."""
@@ -127,9 +143,14 @@ class Evidence:
     def under(self, disturbance: Disturbance) -> Products:
         """The products under a disturbance."""
         view = self.view
-        gram, spread = products(disturbance, view.followed.system, view.base + self.columns, view.prior)
-        samples = int(np.sum(np.asarray(self.view.followed.system.measured)))
-        return Products(disturbance, np.asarray(gram), float(spread), samples, len(self.view.prior))
+        system = view.followed.system
+        pieces = max(1, -(-_PARTS // len(system.measured)))
+        found, spread = block_products(disturbance, system, view.base + self.columns, pieces)
+        parts, known = np.asarray(found), len(view.prior)
+        gram = parts.sum(axis=0)
+        gram[:known, :known] += np.asarray(view.prior)
+        samples = int(np.sum(np.asarray(system.measured)))
+        return Products(disturbance, gram, float(spread), samples, known, parts)
 
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""

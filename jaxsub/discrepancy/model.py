@@ -3,31 +3,43 @@
 import dataclasses
 from collections.abc import Sequence
 
-import jax.numpy as jnp
+import numpy as np
 
-from ..effects import AbstractEffect
+from ..effects import AbstractEffect, amplitudes, numbers, with_numbers
 from ..estimate import Fit, evaluate, search
-from ..likelihood import Disturbance
-from ..results import RESULTS
+from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
-from .view import View, look
+from .view import View
 
 
-def join(view: View, fit: Fit, effects: Sequence[AbstractEffect], disturbance: Disturbance) -> tuple[Fit, View]:
-    """The view's vehicle with `effects`, which begin at their predicted numbers, and all of it fitted again."""
-    vehicle = view.vehicle
-    for effect in effects:
-        vehicle = vehicle.with_effect(effect)
-    return settle(fit, look(free_running(fit, vehicle), disturbance))
+def join(view: View, fit: Fit, effects: Sequence[AbstractEffect]) -> Fit:
+    """The vehicle of `fit` with `effects` more, fitted again as it runs free: what it will be used for.
 
-
-def settle(fit: Fit, view: View) -> tuple[Fit, View]:
-    """The free-running fit of a view's vehicle, with the view's own covariance."""
-    found = free_running(fit, view.vehicle)
-    return dataclasses.replace(found, covariance=jnp.asarray(view.covariance), result=RESULTS.successful), view
-
-
-def free_running(fit: Fit, vehicle: AbstractVehicle) -> Fit:
-    """`vehicle` as it is on the runs of `fit`, from the initial states that suit it best."""
-    _, start, sigma, cost, steps, result = search(vehicle, fit.runs, sigma=fit.sigma, moving=False)
+    The search begins at what innovations say of all numbers, and where that does not run from the effects' predicted
+    sizes or a tenth of them.
+    """
+    led = view.vehicle
+    starts = [joined(led, effects, 1.0), joined(fit.vehicle, effects, 1.0), joined(fit.vehicle, effects, 0.1)]
+    best = None
+    for vehicle in starts:
+        found = search(vehicle, fit.runs, sigma=fit.sigma)
+        if best is None or float(found[3]) < float(best[3]) or not np.isfinite(float(best[3])):
+            best = found
+        if float(best[3]) < float(fit.cost):
+            break
+    assert best is not None
+    vehicle, start, sigma, cost, steps, result = best
     return evaluate(vehicle, fit.runs, start, sigma, cost=cost, steps=steps, result=result)
+
+
+def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: float) -> AbstractVehicle:
+    """`vehicle` with `effects`, their amplitudes scaled by `share`."""
+    for effect in effects:
+        scaled = {name: share * numbers(effect)[name] for name in amplitudes(effect)}
+        vehicle = vehicle.with_effect(with_numbers(effect, scaled))
+    return vehicle
+
+
+def allowing_for(view: View, fit: Fit) -> Fit:
+    """A fit with errors of its numbers that allow for the disturbance that its view has."""
+    return dataclasses.replace(fit, covariance=coloured_covariance(fit, view.disturbance).covariance)

@@ -120,6 +120,12 @@ class Selector:
         fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
         return Scan(np.where(fine, best, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
 
+    def predicts(self, chosen: Sequence[int], more: int) -> bool:
+        """Whether `more` helps to predict parts of the recordings from the others."""
+        before, after = self.columns(chosen), self.columns([*chosen, more])
+        with_it = self.evidence.best(after)[1].predicted(after)
+        return with_it > self.evidence.best(before)[1].predicted(before)
+
     def p_value(self, statistic: float, columns: int) -> float:
         """Of χ² with so many columns, corrected for all candidates tried."""
         tried = len({(c.label, *c.symbols()) for c in self.candidates})
@@ -138,7 +144,11 @@ def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffe
 
 
 def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan], list[float]]:
-    """Candidates chosen one after the other; the scans before each choice and at the end; the p-values of each best."""
+    """Candidates chosen one after the other; the scans before each choice and at the end; the p-values of each best.
+
+    One that does not help to predict a part of the recordings from the others is passed over: a model that is wrong in
+    other ways finds in any flexible enough effect something to fit, but not the same thing everywhere.
+    """
     chosen: list[int] = []
     scans, p_values = [], []
     while True:
@@ -152,6 +162,11 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
         )
         if not gain > 0.0 or p_values[-1] >= SIGNIFICANCE or len(chosen) == MOST_EFFECTS:
             return chosen, scans, p_values
+        if not selector.predicts(chosen, best):
+            selector.usable[best] = False
+            scans.pop()
+            p_values.pop()
+            continue
         chosen = _without_idle(selector, [*chosen, best])
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -18,6 +19,8 @@ from .diagnosis import ChannelQuality, Coefficient, Estimate, Overlay, RunQualit
 
 _WEAK, _OPEN = 0.5, 5.0
 _BLOCKS, _DRAWS = 24, 1999
+# a free run's χ² may grow so much by chance
+_WORSE = 1.05
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,13 +28,14 @@ class HeldOut:
     """A vehicle's free run through runs that its fit did not see: only their initial states were found.
 
     `predicted` and `error` are lists of (K, c) arrays in SI, a run each; `rms` is rms(error)/σ by channel.
-    `expected` are (K,) log likelihoods of each sample given those before it, a run each.
+    `expected` are (K,) log likelihoods of each sample given those before it, a run each; `chi_square` is of all errors.
     """
 
     predicted: list[np.ndarray]
     error: list[np.ndarray]
     rms: dict[str, float]
     expected: list[np.ndarray]
+    chi_square: float
 
 
 def hold(
@@ -47,9 +51,9 @@ def hold(
         errors += list(np.asarray(output_errors(vehicle, taken, start))[: len(batch)])
         spread = initial_guess(vehicle, taken)[1]
         expected += list(np.asarray(_expected(vehicle, taken, sigma, disturbance, start, spread))[: len(batch)])
-    whitened = np.stack(errors) / np.asarray(sigma)
-    rms = channel_rms(jnp.asarray(whitened), runs.take(list(chosen), len(chosen)), vehicle.layout.channels)
-    return HeldOut(predicted, errors, rms, expected)
+    whitened_error = np.stack(errors) / np.asarray(sigma)
+    rms = channel_rms(jnp.asarray(whitened_error), runs.take(list(chosen), len(chosen)), vehicle.layout.channels)
+    return HeldOut(predicted, errors, rms, expected, float(np.sum(whitened_error**2)))
 
 
 @eqx.filter_jit
@@ -63,8 +67,27 @@ def _expected(
     return -logarithm - 0.5 * jnp.sum(white[..., 0] ** 2, axis=-1)
 
 
-def luck(before: HeldOut, after: HeldOut) -> tuple[float, float]:
-    """The gain in log likelihood of the held-out runs, and the probability that it is luck.
+class Luck(NamedTuple):
+    """What held-out runs gain.
+
+    **Fields**
+
+    - `likelihood`: in log likelihood, each sample given those before it. `probability`: that this is luck.
+    - `free`: the ratio of a free run's χ², after to before.
+    """
+
+    likelihood: float
+    probability: float
+    free: float
+
+    @property
+    def helps(self) -> bool:
+        """Whether what comes next is predicted better, and a free run not worse."""
+        return self.likelihood > 0.0 and self.free < _WORSE
+
+
+def luck(before: HeldOut, after: HeldOut) -> Luck:
+    """The gain of held-out runs, and whether it is luck.
 
     By a bootstrap over blocks of samples (Künsch 1989, Ann. Statist. 17): neighbouring samples' gains go together.
     """
@@ -72,7 +95,8 @@ def luck(before: HeldOut, after: HeldOut) -> tuple[float, float]:
     blocks = np.concatenate([[part.sum() for part in np.array_split(gain, _BLOCKS)] for gain in gains])
     rng = np.random.default_rng(0)
     drawn = rng.choice(blocks, (_DRAWS, len(blocks))).sum(axis=1)
-    return float(blocks.sum()), float((1 + np.sum(drawn <= 0.0)) / (1 + _DRAWS))
+    probability = float((1 + np.sum(drawn <= 0.0)) / (1 + _DRAWS))
+    return Luck(float(blocks.sum()), probability, after.chi_square / max(before.chi_square, 1e-300))
 
 
 def overlays(

@@ -1,10 +1,13 @@
 """What the evidence amounts to: none, named, ambiguous or unknown."""
 
 import dataclasses
+from collections.abc import Sequence
 
+from ..effects import AbstractEffect
 from .diagnosis import Location, Physics, Verdict
 from .generic import Pattern
 from .name import Named, Naming
+from .show import Luck
 
 _CERTAIN = 0.9
 _EXPLAINED = 0.75
@@ -44,15 +47,19 @@ def judge(naming: Naming, pattern: Pattern | None) -> Judged:
     return Judged(verdict, naming.named, p_value, notes)
 
 
-def helped(judged: Judged, held_out: tuple[float, float]) -> Judged:
-    """The verdict once the gain in log likelihood of the held-out runs and its probability to be luck are known."""
-    gain, luck = held_out
-    said = f"The held-out runs gain {gain:.4g} in log likelihood; that this is luck has probability {luck:.2g}."
-    if gain > 0.0:
-        return dataclasses.replace(judged, notes=[*judged.notes, said], improves=True)
-    labels = ", ".join(named.effect.label for named in judged.named) or "a force without a name"
+def helped(judged: Judged, added: Sequence[AbstractEffect], gain: Luck) -> Judged:
+    """The verdict once it is known what the held-out runs gain by the `added` effects."""
+    labels = ", ".join(effect.label for effect in added)
+    if gain.helps:
+        said = f"With {labels} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
+        said += f"that this is luck has probability {gain.probability:.2g}."
+        kept = [named for named in judged.named if named.effect in added]
+        return dataclasses.replace(judged, named=kept, notes=[*judged.notes, said], improves=True)
     said = f"{labels} fitted the training runs better but the held-out runs worse, and is not accepted."
-    return dataclasses.replace(judged, verdict="unknown", named=[], notes=[*judged.notes, said])
+    notes = [*judged.notes, said]
+    if len(added) > 1:
+        return dataclasses.replace(judged, notes=notes)
+    return dataclasses.replace(judged, verdict="unknown", named=[], notes=notes)
 
 
 def summary(verdict: Verdict, physics: list[Physics], where: list[Location]) -> str:

@@ -163,10 +163,22 @@ def products(
     disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "b b"]
 ) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
     """Products of all columns whitened, the `prior` of the first b included; half the residuals' log-determinant."""
-    white, factor = whitened(disturbance, system, columns)
-    flat = white.reshape(-1, white.shape[-1])
+    parts, spread = block_products(disturbance, system, columns, 1)
     b = len(prior)
-    return (flat.T @ flat).at[:b, :b].add(prior), jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)))
+    return jnp.sum(parts, axis=0).at[:b, :b].add(prior), spread
+
+
+@eqx.filter_jit
+def block_products(
+    disturbance: Disturbance, system: System, columns: Columns, pieces: int
+) -> tuple[Float[Array, "m q q"], Float[Array, ""]]:
+    """Products of all columns whitened, in each of `pieces` parts of every run; half the log-determinant of all."""
+    white, factor = whitened(disturbance, system, columns)
+    r, k, c, q = white.shape
+    length = -(-k // pieces)
+    padded = jnp.pad(white, [(0, 0), (0, pieces * length - k), (0, 0), (0, 0)])
+    flat = padded.reshape(r * pieces, length * c, q)
+    return jnp.swapaxes(flat, 1, 2) @ flat, jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)))
 
 
 @eqx.filter_jit

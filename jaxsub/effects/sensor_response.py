@@ -90,9 +90,8 @@ class SensorRectification(AbstractSensor):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorRectification]":
-        """Each channel that may be negative and, noise apart, never was."""
-        signed = [c for c in facts.channels if c in facts.output_range and c not in _ONE_SIGN]
-        return [cls(c) for c in signed if facts.output_range[c][0] > -0.05 * facts.output_range[c][1]]
+        """Each channel that may be negative: where only a part is lost, some of it still is."""
+        return [cls(c) for c in facts.channels if c not in _ONE_SIGN]
 
     @property
     def expression(self) -> str:

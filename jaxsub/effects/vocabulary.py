@@ -22,7 +22,6 @@ from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, Thru
 from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
 from .sensors import SensorBias, SensorDrift, SensorScale
-from .smooth import SmoothForce
 
 GROUP = "jaxsub.effects"
 
@@ -71,7 +70,6 @@ VOCABULARY: tuple[type[AbstractEffect], ...] = (
     SensorSaturation,
     SensorRectification,
     SensorDrift,
-    SmoothForce,
 )
 
 

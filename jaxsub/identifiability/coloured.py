@@ -46,14 +46,19 @@ class Coloured(eqx.Module):
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
 
 
-def coloured_covariance(fit: Fit) -> Coloured:
-    """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed."""
-    covariance, disturbance = _corrected(fit.problem, fit.model)
+def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None) -> Coloured:
+    """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed.
+
+    The `disturbance` is estimated from the residuals where none is given.
+    """
+    covariance, disturbance = _corrected(fit.problem, fit.model, disturbance)
     return Coloured(covariance, disturbance, fit.names)
 
 
 @eqx.filter_jit
-def _corrected(problem: Problem, model: Linearised) -> tuple[Float[Array, "p p"], Disturbance]:
+def _corrected(
+    problem: Problem, model: Linearised, disturbance: Disturbance | None
+) -> tuple[Float[Array, "p p"], Disturbance]:
     theta, start, residual = whitened_columns(problem, model)
     precision = problem.prior_std**-2.0
     own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(start.shape[3])
@@ -73,7 +78,8 @@ def _corrected(problem: Problem, model: Linearised) -> tuple[Float[Array, "p p"]
     prior = prior.at[1:, 1:].add(jnp.diag(jnp.where(empty, 1.0, 0.0)))
     system = System.of(model, problem.runs, problem.sigma, problem.spread)
     columns = Columns(jnp.concatenate([residual[..., None], theta @ basis], axis=-1))
-    disturbance = estimate_disturbance(system, columns, prior, first_guess(system, residual))
+    if disturbance is None:
+        disturbance = estimate_disturbance(system, columns, prior, first_guess(system, residual))
     # D = basis basisᵀ, so that white noise alone gives D back
     middle = basis.T @ (carried(disturbance, system, left) + pinned) @ basis
     return basis @ middle @ basis.T + untold @ untold.T, disturbance

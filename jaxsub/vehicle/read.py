@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..effects import EQUATIONS, AbstractEffect, number_fields, options, parameter_table, vocabulary
+from ..effects import EQUATIONS, AbstractEffect, SmoothForce, number_fields, options, parameter_table, vocabulary
 from ..errors import InputError
 from ..parameters import Parameter
 from .build import BODY_KEYS, VECTORS, build
@@ -61,7 +61,7 @@ def vehicle_from(
     numbers = dict(body)
     for name, entry in top.table("coefficients").items():
         numbers[name] = read_number(name, entry, f"{where}: coefficients.{name}", free=True)
-    kinds = {kind.name: kind for kind in (*vocabulary(), *effects)}
+    kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
     built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
     return build(
         where=where,
