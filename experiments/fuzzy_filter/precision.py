@@ -48,7 +48,7 @@ from .realtime import Flight, flight
 _DEGREE = np.pi / 180.0
 _RATE = 25
 # each program runs once
-_QUICKLY = {"xla_backend_optimization_level": 0}
+_QUICKLY: dict[str, str | bool] = {"xla_backend_optimization_level": "0"}
 _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 _FORMS: dict[str, AbstractForm] = {"qr": SquareRoot(), "svd": SquareRoot("svd"), "covariance": Covariance()}
 _RULES: dict[str, Callable[[np.ndarray], AbstractNoiseRule]] = {

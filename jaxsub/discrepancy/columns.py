@@ -143,6 +143,13 @@ def _respond(effect: AbstractActuator, times: Array, nodes: Array) -> Array:
     return jax.vmap(effect.respond)(times, nodes)
 
 
+def plausible(path: Trajectory, effect: AbstractEffect) -> bool:
+    """Whether a sensor's error is smaller than what the sensor shows: a larger one is no sensor error but a way out."""
+    if not isinstance(effect, AbstractSensor):
+        return True
+    return float(np.ptp(sensor_change(path, effect))) <= float(np.ptp(path.true[effect.channel]))
+
+
 def sensor_change(path: Trajectory, effect: AbstractSensor) -> np.ndarray:
     """What a sensor effect changes in its channel, (R, K)."""
     return np.asarray(effect.measure(jnp.asarray(path.times), path.true, path.seen)) - path.true[effect.channel]

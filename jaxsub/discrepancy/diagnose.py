@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array
@@ -21,12 +22,12 @@ from .diagnosis import Diagnosis, Location, Physics, Rival
 from .evidence import Evidence
 from .generic import Pattern, pattern
 from .locate import Field, effect_shares, locations, shares, traces
-from .model import allowing_for, join
+from .model import allowing_for, join, sound
 from .name import Named, Naming, Selector, name
 from .process_noise import noise_note, noise_signals
 from .progress import Progress
 from .show import HeldOut, channel_quality, coefficients, estimates, hold, luck, overlays, run_quality
-from .verdict import Judged, helped, judge, summary
+from .verdict import Judged, helped, judge, settled, summary
 from .view import View, facts, look
 
 
@@ -68,25 +69,24 @@ def diagnose(
     share = shares(view, naming.first, candidates(facts(view), vocabulary))
     field = Field(share, traces(view, train), signals)
     progress("free runs through what the fit did not see")
-    trial = Trial(runs, chosen, size, start.sigma)
+    trial = Trial(runs, chosen, size, start.sigma, start)
     before = trial.held_out(start, view.disturbance)
     judged = judge(naming, found.pattern)
     added: list[AbstractEffect] = [named.effect for named in judged.named]
     if judged.verdict == "unknown" and found.pattern is not None and found.pattern.significant:
         added = [found.pattern.force]
-    improved, after, remaining = start, before, view
-    # what fails on runs that were not fitted loses its last effect: the first explain most and stand most firmly
-    while added and not judged.improves:
-        progress(f"fitting with {', '.join(effect.label for effect in added)}")
-        joined = join(view, start, added)
-        seen_there = look(joined, naming.products.disturbance)
-        shown = trial.held_out(joined, seen_there.disturbance)
-        judged = helped(judged, added, luck(before, shown))
-        if judged.improves:
-            improved, after, remaining = joined, shown, seen_there
-        added = added[:-1]
+    best = Model(start, view, before, ())
+    # one after the other, since what fails on runs that were not fitted must not take with it what stands
+    for effect in added:
+        more = trial.with_effects(found, (*best.added, effect), progress)
+        judged = helped(judged, effect, sound(more.fit, more.added), luck(best.shown, more.shown))
+        if effect not in judged.refused:
+            best = more
+    judged = settled(judged)
     baseline = allowing_for(view, start)
-    improved = baseline if improved is start else allowing_for(remaining, improved)
+    improved, after, remaining = baseline, best.shown, best.view
+    if best.added:
+        improved = allowing_for(remaining, best.fit)
     where = _where(judged, found, field, train)
     physics = [_physics(named, improved) for named in judged.named]
     diagnosis = Diagnosis(
@@ -117,6 +117,15 @@ def diagnose(
     return diagnosis, improved.vehicle
 
 
+class Model(NamedTuple):
+    """A fit, its view, what it shows on the held-out runs, and the effects that were added to the baseline."""
+
+    fit: Fit
+    view: View
+    shown: HeldOut
+    added: tuple[AbstractEffect, ...]
+
+
 @dataclasses.dataclass(frozen=True)
 class Trial:
     """The runs that no fit saw: numbers `chosen` of `runs`, of which the first `size` were fitted."""
@@ -125,6 +134,14 @@ class Trial:
     chosen: Sequence[int]
     size: int
     sigma: Array
+    start: Fit
+
+    def with_effects(self, found: Found, effects: tuple[AbstractEffect, ...], progress: Progress) -> Model:
+        """The baseline with `effects`, fitted again and tried."""
+        progress(f"fitting with {', '.join(effect.label for effect in effects)}")
+        joined = join(found.view, self.start, effects)
+        view = look(joined, found.naming.products.disturbance)
+        return Model(joined, view, self.held_out(joined, view.disturbance), effects)
 
     def held_out(self, fit: Fit, disturbance: Disturbance) -> HeldOut:
         """A fit's vehicle on them."""

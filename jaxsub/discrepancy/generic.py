@@ -24,13 +24,15 @@ class Pattern:
 
     **Fields**
 
-    - `force`: with its predicted numbers. `p_value`: that so much is luck, corrected for all tried.
+    - `force`: with its predicted numbers. `p_value`: that so much is luck, corrected for all tried; `predicts`: whether
+      it helps to predict parts of the recordings from the others.
     - `value`: log evidence with it and what was chosen; `alone`: with it and nothing else.
     - `explained`: the share of what chosen effects and it explain together that the chosen ones explain alone.
     """
 
     force: SmoothForce
     p_value: float
+    predicts: bool
     value: float
     alone: float
     explained: float
@@ -38,7 +40,7 @@ class Pattern:
     @property
     def significant(self) -> bool:
         """Whether it is there."""
-        return self.p_value < SIGNIFICANCE
+        return self.predicts and self.p_value < SIGNIFICANCE
 
     @property
     def described(self) -> str:
@@ -93,7 +95,11 @@ def pattern(view: View, chosen: Evidence, columns: list[int], disturbances: list
     size = gains.amplitudes[best] / evidence.length[owners[best]]
     force = with_numbers(forces[best], dict(zip(names, size.tolist(), strict=True)))
     alone = max(p.solve([])[0] + float(np.max(p.gains([], owners).evidence)) for p in evidence.products)
-    return Pattern(force, p_value, value + float(gains.evidence[best]), alone, _explained(evidence, held, owners[best]))
+    both = [*held, *owners[best]]
+    predicts = evidence.best(both)[1].predicted(both) > products.predicted(held)
+    return Pattern(
+        force, p_value, predicts, value + float(gains.evidence[best]), alone, _explained(evidence, held, owners[best])
+    )
 
 
 def _explained(evidence: Evidence, held: list[int], more: list[int]) -> float:

@@ -5,11 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect, amplitudes, numbers, with_numbers
+from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
 from ..estimate import Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .view import View
+
+# a shape such as a lag at which its effect is gone
+_VANISHED = 1e-6
 
 
 def join(view: View, fit: Fit, effects: Sequence[AbstractEffect]) -> Fit:
@@ -38,6 +41,16 @@ def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: f
         scaled = {name: share * numbers(effect)[name] for name in amplitudes(effect)}
         vehicle = vehicle.with_effect(with_numbers(effect, scaled))
     return vehicle
+
+
+def sound(fit: Fit, effects: Sequence[AbstractEffect]) -> bool:
+    """Whether all of `effects` came out of a fit with signs that physics admits, and none of them vanished."""
+    labels = {effect.label for effect in effects}
+    for effect in (e for e in fit.vehicle.effects if e.label in labels):
+        found, linear = numbers(effect), amplitudes(effect)
+        if not admissible(effect, found) or any(v <= _VANISHED for n, v in found.items() if n not in linear):
+            return False
+    return True
 
 
 def allowing_for(view: View, fit: Fit) -> Fit:

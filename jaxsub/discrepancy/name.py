@@ -13,6 +13,7 @@ import numpy as np
 from scipy import special
 
 from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
+from .columns import plausible
 from .diagnosis import Candidate
 from .evidence import SLOTS, Evidence, Products
 from .progress import Progress
@@ -21,6 +22,8 @@ SIGNIFICANCE = 0.01
 MOST_EFFECTS = 4
 _ABSORBED = 1e-4
 _POSSIBLE = 0.02
+# χ² from which a candidate may come to be chosen
+_LOOKED_AT = 10.0
 # disturbances estimated for rivals of one step
 _TRIES = 3
 
@@ -116,7 +119,9 @@ class Selector:
         for i, effect in enumerate(self.candidates):
             predicted, good = predict(effect, sizes[i] / self.evidence.length[self.owners[i]])
             effects.append(predicted)
-            right.append(good and bool(self.usable[i]) and effect.label not in taken)
+            good = good and bool(self.usable[i]) and effect.label not in taken
+            # worth a look only where it may be chosen
+            right.append(good and (statistic[i] < _LOOKED_AT or plausible(self.evidence.view.path, predicted)))
         fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
         return Scan(np.where(fine, best, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
 

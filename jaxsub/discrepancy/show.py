@@ -16,11 +16,13 @@ from ..recording import Recording
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .diagnosis import ChannelQuality, Coefficient, Estimate, Overlay, RunQuality
+from .whiteness import record_sigma
 
 _WEAK, _OPEN = 0.5, 5.0
 _BLOCKS, _DRAWS = 24, 1999
 # a free run's χ² may grow so much by chance
 _WORSE = 1.05
+_CHANCE = 0.05
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,8 +84,8 @@ class Luck(NamedTuple):
 
     @property
     def helps(self) -> bool:
-        """Whether what comes next is predicted better, and a free run not worse."""
-        return self.likelihood > 0.0 and self.free < _WORSE
+        """Whether what comes next is predicted better, not by luck, and a free run not worse."""
+        return self.likelihood > 0.0 and self.probability < _CHANCE and self.free < _WORSE
 
 
 def luck(before: HeldOut, after: HeldOut) -> Luck:
@@ -156,13 +158,6 @@ def channel_quality(fit: Fit) -> list[ChannelQuality]:
             ChannelQuality(output.channel, unit, samples, missing, sigma, output.sigma is None, float(white[i]))
         )
     return rows
-
-
-def record_sigma(error: Float[np.ndarray, "r k c"], mask: np.ndarray) -> Float[np.ndarray, " c"]:
-    r"""The white part of each channel's residual $\sqrt{\tfrac12\langle(e_{k+1}-e_k)^2\rangle}$, SI (von Neumann)."""
-    both = mask[:, 1:] & mask[:, :-1]
-    squares = np.sum(np.where(both, np.diff(error, axis=1), 0.0) ** 2, axis=(0, 1))
-    return np.sqrt(0.5 * squares / np.maximum(both.sum((0, 1)), 1))
 
 
 def run_quality(recordings: Sequence[Recording], role: str) -> list[RunQuality]:

@@ -13,6 +13,7 @@ _CERTAIN = 0.9
 _EXPLAINED = 0.75
 # log evidence by which a force without a name must beat the names to stand instead of them
 _CLEARLY = 3.0
+_BEYOND_DOUBT = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,12 +25,14 @@ class Judged:
     p_value: float
     notes: list[str]
     improves: bool = False
+    refused: tuple[AbstractEffect, ...] = ()
 
 
 def judge(naming: Naming, pattern: Pattern | None) -> Judged:
     """The verdict before anything was tried on the held-out runs."""
     follows = pattern is not None and pattern.significant
-    least = naming.first_p if pattern is None or naming.named else min(naming.first_p, pattern.p_value)
+    # a scan that no choice followed was either not significant or predicted nothing
+    least = naming.first_p if naming.named or pattern is None or not follows else min(naming.first_p, pattern.p_value)
     p_value: float = min(1.0, 2.0 * least)
     notes: list[str] = []
     if pattern is not None and follows:
@@ -43,23 +46,35 @@ def judge(naming: Naming, pattern: Pattern | None) -> Judged:
     if pattern is not None and follows and pattern.explained < _EXPLAINED:
         notes.append(f"{labels} would explain {pattern.explained:.0%} of the mismatch, too little for its cause.")
         return Judged("unknown", [], p_value, notes)
-    verdict: Verdict = "named" if all(named.probability >= _CERTAIN for named in naming.named) else "ambiguous"
-    return Judged(verdict, naming.named, p_value, notes)
+    return Judged(_certainty(naming.named), naming.named, p_value, notes)
 
 
-def helped(judged: Judged, added: Sequence[AbstractEffect], gain: Luck) -> Judged:
-    """The verdict once it is known what the held-out runs gain by the `added` effects."""
-    labels = ", ".join(effect.label for effect in added)
-    if gain.helps:
-        said = f"With {labels} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
+def helped(judged: Judged, effect: AbstractEffect, sound: bool, gain: Luck) -> Judged:
+    """The verdict once it is known what held-out runs gain by an effect, and whether its numbers are `sound`."""
+    if sound and gain.helps:
+        said = f"With {effect.label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
         said += f"that this is luck has probability {gain.probability:.2g}."
-        kept = [named for named in judged.named if named.effect in added]
-        return dataclasses.replace(judged, named=kept, notes=[*judged.notes, said], improves=True)
-    said = f"{labels} fitted the training runs better but the held-out runs worse, and is not accepted."
-    notes = [*judged.notes, said]
-    if len(added) > 1:
-        return dataclasses.replace(judged, notes=notes)
-    return dataclasses.replace(judged, verdict="unknown", named=[], notes=notes)
+        return dataclasses.replace(judged, notes=[*judged.notes, said], improves=True)
+    why = "the held-out runs worse" if sound else "with numbers that physics does not admit"
+    said = f"{effect.label} fitted the training runs better but {why}, and is not accepted."
+    return dataclasses.replace(judged, notes=[*judged.notes, said], refused=(*judged.refused, effect))
+
+
+def settled(judged: Judged) -> Judged:
+    """The verdict once everything was tried: named by what stands.
+
+    Where nothing does, a mismatch that is beyond doubt is unknown, and any other was luck.
+    """
+    stand = [named for named in judged.named if named.effect not in judged.refused]
+    if not judged.named or stand == judged.named:
+        return judged
+    if not stand:
+        return dataclasses.replace(judged, verdict="unknown" if judged.p_value < _BEYOND_DOUBT else "none", named=[])
+    return dataclasses.replace(judged, named=stand, verdict=_certainty(stand))
+
+
+def _certainty(named: Sequence[Named]) -> Verdict:
+    return "named" if all(one.probability >= _CERTAIN for one in named) else "ambiguous"
 
 
 def summary(verdict: Verdict, physics: list[Physics], where: list[Location]) -> str:

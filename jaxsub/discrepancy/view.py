@@ -14,9 +14,11 @@ from ..estimate import Fit, Problem, estimate_disturbance
 from ..likelihood import Columns, Disturbance, Followed, System, first_guess, follow, whitened
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
+from .whiteness import record_sigma
 
 # rounds of following and estimating the disturbance: the path hardly depends on it; steps where it is known
 _ROUNDS, _STEPS = 2, 4
+_LEAST_WHITE = 1e-5
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
 
@@ -92,7 +94,7 @@ def look(fit: Fit, disturbance: Disturbance | None = None) -> View:
     vehicle = fit.vehicle
     if disturbance is None:
         system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
-        disturbance = first_guess(system, fit.residual)
+        disturbance = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
         for _ in range(_ROUNDS):
             at = led.at(vehicle, disturbance)
             disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance)
@@ -107,6 +109,16 @@ def look(fit: Fit, disturbance: Disturbance | None = None) -> View:
     gram, _ = products(disturbance, at.followed.system, at.base, at.prior)
     covariance = np.linalg.inv(np.asarray(gram)[1:, 1:]) / np.outer(at.length, at.length)
     return View(vehicle, covariance, fit.runs, fit.sigma, at.followed, disturbance, path, at.base, at.prior)
+
+
+def _white(fit: Fit) -> Array:
+    """Where to look for the noise of each channel, in units of the fit's: what is white in its errors.
+
+    A noise that the file leaves open is the whole misfit of a free run until now, which may be a thousand times larger.
+    """
+    white = record_sigma(np.asarray(fit.model.error), np.asarray(fit.runs.mask)) / np.asarray(fit.sigma)
+    given = np.array([output.sigma is not None for output in fit.vehicle.layout.outputs])
+    return jnp.asarray(np.where(given, 1.0, np.clip(white, _LEAST_WHITE, 1.0)))
 
 
 class _At(NamedTuple):

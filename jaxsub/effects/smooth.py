@@ -12,7 +12,7 @@ from jaxtyping import Array
 from .base import AbstractForce, amplitude
 from .motion import FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
 
-KNOTS = 8
+KNOTS = 12
 
 
 class SmoothForce(AbstractForce):
@@ -36,6 +36,10 @@ class SmoothForce(AbstractForce):
     a_5: Array = amplitude("1")
     a_6: Array = amplitude("1")
     a_7: Array = amplitude("1")
+    a_8: Array = amplitude("1")
+    a_9: Array = amplitude("1")
+    a_10: Array = amplitude("1")
+    a_11: Array = amplitude("1")
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SmoothForce]":
@@ -65,6 +69,12 @@ class SmoothForce(AbstractForce):
 
 
 def variables(motion: Motion) -> dict[str, Signal]:
-    """What a force may follow, by the name that its user knows: velocities, positions, actuators, surroundings."""
+    """What a force may follow, by the name that its user knows: velocities, positions, actuators, surroundings.
+
+    A heading is taken within a turn, (-π, π].
+    """
     rates: dict[str, Signal] = {VELOCITIES.get(e, f"{e}_rate"): rate for e, rate in motion.rates.items()}
-    return rates | motion.positions | motion.actuators | motion.environment
+    found = rates | motion.positions | motion.actuators | motion.environment
+    if "psi" in found:
+        found["psi"] = jnp.arctan2(jnp.sin(found["psi"]), jnp.cos(found["psi"]))
+    return found

@@ -51,7 +51,10 @@ def run(effect, seed=5):
     return diagnose(wrong(), runs[:2], runs[2:])
 
 
-@pytest.mark.parametrize("effect", [CrossflowDrag("vertical", 5.0, 0.761, 0.3), SensorScale("q", 0.05)])
+@pytest.mark.parametrize(
+    "effect",
+    [pytest.param(CrossflowDrag("vertical", 5.0, 0.761, 0.3), marks=pytest.mark.long), SensorScale("q", 0.05)],
+)
 def test_names_locates_and_improves(effect):
     found, improved = run(effect)
     assert found.verdict == "named"
@@ -78,6 +81,7 @@ def test_nothing_concealed_is_none():
     assert found.fit["held_out"]["baseline"] == found.fit["held_out"]["improved"]
 
 
+@pytest.mark.long
 def test_near_twins_are_ambiguous_with_their_rivals():
     found, _ = run(HullAsymmetry("pitch", 0.6))
     names = {physics.effect for physics in found.physics}
@@ -110,6 +114,7 @@ def test_the_located_force_is_the_one_that_acts():
         assert np.corrcoef(truth, trace.force["heave"])[0, 1] > 0.8
 
 
+@pytest.mark.long
 def test_missing_samples_change_nothing_but_the_precision():
     effect = SensorScale("q", 0.05)
     runs = list(recorded(effect, 5))

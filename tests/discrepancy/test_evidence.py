@@ -83,7 +83,10 @@ def test_statistic_is_chi_square_where_nothing_is_left_out(clean):
 
 @pytest.mark.parametrize(
     ("effect", "field", "tolerance"),
-    [(CrossflowDrag("vertical", 5.0, 0.761, 0.3), "C_d", 0.25), (SensorScale("q", 0.05), "scale", 0.15)],
+    [
+        (CrossflowDrag("vertical", 5.0, 0.761, 0.3), "C_d", 0.25),
+        pytest.param(SensorScale("q", 0.05), "scale", 0.15, marks=pytest.mark.long),
+    ],
 )
 def test_the_concealed_effect_comes_first_with_its_amplitude(effect, field, tolerance):
     view = look(fit(wrong(), batch(wrong(), recorded(effect, 2)[:2])))
