@@ -6,14 +6,21 @@ from pathlib import Path
 
 from jaxsub.cli import session
 
-from . import emps, kvlcc2, seaglider
+from . import emps, rolldecay, seaglider, silverbox, slocum, zigzag
 
-SETS = {"seaglider_sg542": seaglider.report, "kvlcc2_rolldecay": kvlcc2.report, "emps": emps.report}
+SETS = {
+    "seaglider_sg542": seaglider.report,
+    "slocum_comet2016": slocum.report,
+    "kvlcc2_freerunning": zigzag.report,
+    "kvlcc2_rolldecay": rolldecay.report,
+    "emps": emps.report,
+    "silverbox": silverbox.report,
+}
 
 
 def main() -> None:
     """Run one set and write `results.json` beside its diagnosis."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m experiments.real_recordings", description=__doc__)
     parser.add_argument("name", choices=sorted(SETS))
     parser.add_argument("--out", type=Path, required=True)
     chosen = parser.parse_args()

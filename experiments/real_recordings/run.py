@@ -1,22 +1,74 @@
 """Diagnosing a real set from files, as a user would, and keeping everything in one folder."""
 
 import shutil
-from collections.abc import Sequence
+import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from jaxsub.cli.diagnose import show, write_diagnosis
 from jaxsub.discrepancy import Diagnosis
-from jaxsub.recording import Recording
+from jaxsub.discrepancy.diagnosis import Estimate
 from jaxsub.vehicle import read_vehicle
 
+from .by_hand import by_hand
+from .case import Case, FieldUnit
+from .figure import draw_held_out
 
-def diagnose_files(
-    vehicle_text: str, train: Sequence[Recording], held: Sequence[Recording], folder: Path
-) -> tuple[Diagnosis, dict[str, dict[str, float]]]:
-    """The diagnosis, written into `folder` beside the vehicle file; held-out rms by channel (SI) after each effect."""
+
+def diagnose_case(case: Case, folder: Path) -> tuple[Diagnosis, dict]:
+    """The diagnosis and its numbers in field units.
+
+    `folder` then holds the vehicle file, `diagnosis.json`, `improved.toml`, the report and `held_out.png`.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "vehicle.toml").write_text(vehicle_text, encoding="utf-8")
+    (folder / "vehicle.toml").write_text(case.vehicle, encoding="utf-8")
     shutil.rmtree(folder / "figures", ignore_errors=True)
-    diagnosis = write_diagnosis(read_vehicle(folder / "vehicle.toml"), train, held, folder)
+    begin = time.perf_counter()
+    diagnosis = write_diagnosis(read_vehicle(folder / "vehicle.toml"), case.train, case.held, folder)
+    seconds = time.perf_counter() - begin
     show(diagnosis, folder)
-    return diagnosis, dict(diagnosis.history)
+    draw_held_out(diagnosis, case, folder / "held_out.png")
+    return diagnosis, {**numbers(diagnosis, case), "seconds": round(seconds, 1), "by_hand": by_hand(case, folder)}
+
+
+def numbers(diagnosis: Diagnosis, case: Case) -> dict:
+    """What was left out, how large it is, what it is worth on the held-out runs, and what remains."""
+    scaled = lambda rms: {f"{c} ({case.channels[c][1]})": case.channels[c][0] * value for c, value in rms.items()}
+    return {
+        "verdict": diagnosis.verdict,
+        "summary": diagnosis.summary,
+        "left_out": [
+            {
+                "effect": found.label,
+                "expression": found.expression,
+                "probability": found.probability,
+                "rivals": {rival.label: rival.probability for rival in found.rivals},
+                "parameters": {s: in_field_units(s, e, case.parameters) for s, e in found.parameters.items()},
+            }
+            for found in diagnosis.physics
+        ],
+        "held_out_rms": {
+            "before": scaled(diagnosis.history[0][1]),
+            "after": scaled(diagnosis.history[-1][1]),
+        },
+        "published": dict(case.published),
+        "remains": {
+            "rms_over_sigma": {part: diagnosis.fit[part]["improved"] for part in ("train", "held_out")},
+            "notes": diagnosis.notes,
+            "where": [{"where": p.where, "share": p.share, "grows_with": p.grows_with} for p in diagnosis.where],
+            "next_manoeuvre": diagnosis.next_manoeuvre,
+        },
+        "coefficients": {
+            c.name: in_field_units(c.name, c.improved, case.parameters) | {"verdict": c.verdict}
+            for c in diagnosis.coefficients
+            if c.improved
+        },
+        "prepared": case.prepared,
+        "runs": {"train": [r.name for r in case.train], "held_out": [r.name for r in case.held]},
+    }
+
+
+def in_field_units(symbol: str, estimate: Estimate, units: Mapping[str, FieldUnit]) -> dict:
+    """An estimate as its field writes it."""
+    factor, unit = units.get(symbol, (1.0, estimate.unit))
+    return {"value": factor * estimate.value, "standard_error": abs(factor) * estimate.standard_error, "unit": unit}

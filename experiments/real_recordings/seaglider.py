@@ -12,6 +12,8 @@ import pandas as pd
 from jaxsub.recording import Recording
 
 from ..data import data_folder
+from .case import Case
+from .run import diagnose_case
 
 _SURFACE = 15.0  # m; above it waves, communication and the air bladder act
 VEHICLE = """
@@ -43,21 +45,43 @@ temperature = "T"
 [outputs.depth_rate]
 sigma = "estimate"
 """
+PICKED = """
+[[effects]]
+effect = "quadratic-damping"
+equation = "surge"
+[[effects]]
+effect = "hull-compressibility"
+[[effects]]
+effect = "thermal-expansion"
+"""
 
 
-def vehicle_file(density: bool) -> str:
-    """The baseline's vehicle file, with the recorded density as an input or without."""
-    return VEHICLE.format(density='density = "rho"' if density else "")
-
-
-def recordings() -> tuple[list[Recording], list[Recording]]:
-    """Alternate dives to fit and to judge by."""
+def case(density: bool) -> Case:
+    """Alternate dives to fit and to judge by, with the recorded density as an input or without."""
     folder = data_folder("seaglider_sg542")
     flight, ctd = pd.read_csv(folder / "flight.csv"), pd.read_csv(folder / "ctd.csv")
     ctd = ctd.set_index("time").loc[flight["time"]]
     flight["temperature"], flight["rho"] = ctd["temperature"].to_numpy(), ctd["rho_insitu"].to_numpy()
     dives = [_recording(str(number), rows) for number, rows in flight.groupby("dive")]
-    return dives[::2], dives[1::2]
+    return Case(
+        vehicle=VEHICLE.format(density='density = "rho"' if density else ""),
+        train=dives[::2],
+        held=dives[1::2],
+        prepared=(
+            f"{len(dives)} dives below {_SURFACE:g} m, all samples (5 to 20 s); "
+            "vertical speed by differences of depth; odd dives fitted, even ones held out"
+        ),
+        picked=PICKED,
+        channels={"depth_rate": (100.0, "cm/s")},
+        # compressibility per dbar and expansion per °C, as glider people write them
+        parameters={
+            "kappa": (1e4, "1/dbar"),
+            "alpha": (1.0, "1/degC"),
+            "gamma": (1.0, "1/m"),
+            "X_u": (1.0, "N s/m"),
+            "Z_w": (1.0, "N s/m"),
+        },
+    )
 
 
 def _recording(name: str, rows: pd.DataFrame) -> Recording:
@@ -81,35 +105,8 @@ def _recording(name: str, rows: pd.DataFrame) -> Recording:
 
 
 def report(out: Path) -> dict:
-    """Diagnose with the density channel, and in `no_density` without it; the numbers in field units."""
-    from .run import diagnose_files
-
-    train, held = recordings()
-    results = {}
-    for label, density, folder in (("density", True, out), ("no_density", False, out / "no_density")):
-        diagnosis, history = diagnose_files(vehicle_file(density), train, held, folder)
-        results[label] = {
-            "verdict": diagnosis.verdict,
-            "summary": diagnosis.summary,
-            "vertical_speed_rms_cm_s": {step: 100.0 * rms["depth_rate"] for step, rms in history.items()},
-            "parameters": {found.label: field_units(found.parameters) for found in diagnosis.physics},
-            "rivals": {found.label: {r.label: r.probability for r in found.rivals} for found in diagnosis.physics},
-            "coefficients": {
-                c.name: [c.improved.value, c.improved.standard_error] for c in diagnosis.coefficients if c.improved
-            },
-        }
-    return results
-
-
-def field_units(parameters: dict) -> dict:
-    """Parameters as glider people write them: compressibility per dbar, expansion per °C."""
-    units = {"kappa": (1e4, "1/dbar"), "alpha": (1.0, "1/degC"), "gamma": (1.0, "1/m"), "delta_B": (1.0, "N")}
-    named = {}
-    for symbol, estimate in parameters.items():
-        factor, unit = units.get(symbol, (1.0, estimate.unit))
-        named[symbol] = {
-            "value": factor * estimate.value,
-            "standard_error": factor * estimate.standard_error,
-            "unit": unit,
-        }
-    return named
+    """Diagnose with the density channel, and in `no_density` without it."""
+    return {
+        "density": diagnose_case(case(True), out)[1],
+        "no_density": diagnose_case(case(False), out / "no_density")[1],
+    }
