@@ -9,27 +9,24 @@ Sources: Goodwin and Payne (1977), Dynamic System Identification, ch. 6; Morelli
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from ..likelihood import linearise
 from ..recording import Recording
 from ..recording.runs import Runs
-from ..simulate import at_rest, prbs, sampled_states
+from ..simulate import at_rest, sampled_states
 from ..vehicle import AbstractVehicle
 from .design_information import Information, information, log_det, require_designable
 from .design_limits import Bounds, Limits, manoeuvre, template
+from .design_search import descend, telegraphs
 
 # weight of the squared excess over a channel's limit, and the part of the limit from which it counts
 _PENALTY, _MARGIN = 3.0, 0.98
-_STARTED = 0.9  # of the amplitude, where the commands of a start are put: at all of it tanh has no slope
-_TOLERANCE, _HALVINGS = 1e-5, 30
+_HALVINGS = 30
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,18 +72,22 @@ def design(
     require_designable(vehicle)
     bounds = Bounds.of(vehicle, limits, times)
     columns = surroundings or {}
-    family = [*starts, *_telegraphs(vehicle, limits, times, columns, seed)]
-    goal = _Goal(vehicle, template(vehicle, family[:1]), at_rest(vehicle, 1), bounds)
-    commands = [jnp.asarray(recording.inputs(vehicle.layout.held)) for recording in family]
-    tried = [goal.inside(bounds.follow(command)) for command in commands]
+    family = [(recording.name, recording.inputs(vehicle.layout.held)) for recording in starts]
+    family += telegraphs(bounds, seed).items()
+    blank = manoeuvre(vehicle, "blank", times, np.zeros_like(bounds.step), columns)
+    goal = _Goal(vehicle, template(vehicle, [blank]), at_rest(vehicle, 1), bounds)
+    tried = [goal.inside(bounds.follow(jnp.asarray(commands))) for _, commands in family]
     worth = [goal.worth(inputs) for inputs in tried]
     order = np.argsort(worth)[::-1]
     best = order[0]
-    found = (worth[best], tried[best], family[best].name, [])
-    for index in order[:searches]:
-        inputs, history = _search(goal, tried[index], steps)
+    found = (worth[best], tried[best], family[best][0], [])
+    begin = jnp.stack([bounds.free(tried[index]) for index in order[:searches]])
+    ends, losses = descend(_loss, begin, goal, steps)
+    gained = -len(vehicle.layout.free) * np.asarray(losses)
+    for index, free, history in zip(order, ends, gained, strict=False):
+        inputs = goal.inside(bounds.inputs(free))
         if (value := goal.worth(inputs)) > found[0]:
-            found = (value, inputs, family[index].name, history)
+            found = (value, inputs, family[index][0], history[np.isfinite(history)].tolist())
     recording = manoeuvre(vehicle, "design", times, np.asarray(found[1]), columns)
     return Design(recording, information(vehicle, recording), *found[2:])
 
@@ -146,38 +147,5 @@ class _Goal(eqx.Module):
         return low * inputs
 
 
-def _search(goal: _Goal, begin: Float[Array, "k m"], steps: int) -> tuple[Float[Array, "k m"], list[float]]:
-    """The inputs that L-BFGS makes of `begin`, inside all limits, and minus p times the loss after each step."""
-    solver = optx.LBFGS(rtol=_TOLERANCE, atol=_TOLERANCE)
-    free = jnp.arctanh(_STARTED * jnp.clip(begin / goal.bounds.amplitude, -1.0, 1.0))
-    scalar = jax.ShapeDtypeStruct((), free.dtype)
-    state: Any = solver.init(_loss, free, goal, {}, scalar, None, frozenset())
-    history, p = [], len(goal.vehicle.layout.free)
-    for _ in range(steps):
-        free, state = _step(solver, goal, free, state)
-        history.append(-p * float(state.f_info.f))
-        if bool(state.terminate):
-            break
-    return goal.inside(goal.bounds.inputs(free)), history
-
-
-@eqx.filter_jit
-def _step(solver: Any, goal: _Goal, free: Float[Array, "k m"], state: Any) -> tuple[Float[Array, "k m"], Any]:
-    free, state, _ = solver.step(_loss, free, goal, {}, state, frozenset())
-    return free, state
-
-
-def _loss(free: Float[Array, "k m"], goal: _Goal) -> tuple[Float[Array, ""], None]:
-    return goal.loss(free), None
-
-
-def _telegraphs(
-    vehicle: AbstractVehicle, limits: Limits, times: np.ndarray, surroundings: Mapping[str, np.ndarray], seed: int
-) -> list[Recording]:
-    """Random telegraph signals, independent for each actuator, of holds from one sample to about half the run."""
-    held, made = vehicle.layout.held, []
-    for level in range(int(np.log2(len(times)))):
-        hold, draw = 2**level, 1000 * (100 * seed + level)
-        signals = [prbs(len(times), hold, limits.amplitude[name], draw + i) for i, name in enumerate(held)]
-        made.append(manoeuvre(vehicle, f"telegraph of {hold} samples", times, np.stack(signals, 1), surroundings))
-    return made
+def _loss(free: Float[Array, "k m"], goal: _Goal) -> Float[Array, ""]:
+    return goal.loss(free)

@@ -89,7 +89,7 @@ def test_correction_of_white_noise_changes_little(exact):
 def dense():
     """A short random system of three states and two forces, and its residuals' covariance written out."""
     rng = np.random.default_rng(7)
-    K, s, n, c, p = 6, 3, 2, 2, 2
+    K, s, n, c = 6, 3, 2, 2
     data = System(
         A=jnp.asarray(0.6 * rng.standard_normal((1, K - 1, s, s))),
         G=jnp.asarray(rng.standard_normal((1, K - 1, s, 2 * n))),
