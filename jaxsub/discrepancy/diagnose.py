@@ -66,8 +66,7 @@ def diagnose(
     found = examine(look(start), vocabulary, progress)
     view, naming = found.view, found.naming
     signals = noise_signals(start, train)
-    share = shares(view, naming.first, candidates(facts(view), vocabulary))
-    field = Field(share, traces(view, train), signals)
+    field = Field(shares(view, naming.first), traces(view, train), signals)
     progress("free runs through what the fit did not see")
     trial = Trial(runs, chosen, size, start.sigma, start)
     before = trial.held_out(start, view.disturbance)
@@ -83,10 +82,9 @@ def diagnose(
         if effect not in judged.refused:
             best = more
     judged = settled(judged)
+    after, remaining = best.shown, best.view
     baseline = allowing_for(view, start)
-    improved, after, remaining = baseline, best.shown, best.view
-    if best.added:
-        improved = allowing_for(remaining, best.fit)
+    improved = allowing_for(remaining, best.fit) if best.added else baseline
     where = _where(judged, found, field, train)
     physics = [_physics(named, improved) for named in judged.named]
     diagnosis = Diagnosis(
@@ -97,7 +95,7 @@ def diagnose(
         where=where,
         physics=physics,
         fit={
-            "train": {"baseline": channel_scaled(baseline), "improved": channel_scaled(improved)},
+            "train": {"baseline": baseline.rms, "improved": improved.rms},
             "held_out": {"baseline": before.rms, "improved": after.rms},
         },
         candidates=naming.candidates,
@@ -192,11 +190,6 @@ def _physics(named: Named, improved: Fit) -> Physics:
         estimates(improved, effect.label, effect.symbols()),
         rivals,
     )
-
-
-def channel_scaled(found: Fit) -> dict[str, float]:
-    """rms(error)/σ on the training runs."""
-    return found.rms
 
 
 def disturbance_note(view: View) -> list[str]:

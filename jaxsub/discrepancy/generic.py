@@ -26,14 +26,13 @@ class Pattern:
 
     - `force`: with its predicted numbers. `p_value`: that so much is luck, corrected for all tried; `predicts`: whether
       it helps to predict parts of the recordings from the others.
-    - `value`: log evidence with it and what was chosen; `alone`: with it and nothing else.
+    - `alone`: log evidence with it and nothing else.
     - `explained`: the share of what chosen effects and it explain together that the chosen ones explain alone.
     """
 
     force: SmoothForce
     p_value: float
     predicts: bool
-    value: float
     alone: float
     explained: float
 
@@ -87,7 +86,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], disturbances: list
     evidence = Evidence.of(view, own + hats, disturbances)
     held = list(range(len(columns)))
     owners = [list(range(len(columns) + KNOTS * i, len(columns) + KNOTS * (i + 1))) for i in range(len(forces))]
-    value, products = evidence.best(held)
+    products = evidence.best(held)[1]
     gains = products.gains(held, owners)
     best = int(np.argmax(gains.statistic))
     p_value = min(1.0, len(forces) * float(special.chdtrc(KNOTS, float(gains.statistic[best]))))
@@ -97,9 +96,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], disturbances: list
     alone = max(p.solve([])[0] + float(np.max(p.gains([], owners).evidence)) for p in evidence.products)
     both = [*held, *owners[best]]
     predicts = evidence.best(both)[1].predicted(both) > products.predicted(held)
-    return Pattern(
-        force, p_value, predicts, value + float(gains.evidence[best]), alone, _explained(evidence, held, owners[best])
-    )
+    return Pattern(force, p_value, predicts, alone, _explained(evidence, held, owners[best]))
 
 
 def _explained(evidence: Evidence, held: list[int], more: list[int]) -> float:

@@ -58,14 +58,14 @@ def traces(view: View, recordings: Sequence[Recording]) -> list[ForceTrace]:
     return found
 
 
-def shares(view: View, scan: Scan, candidates: Sequence[AbstractEffect]) -> dict[str, float]:
+def shares(view: View, scan: Scan) -> dict[str, float]:
     """How much of the mismatch each equation, sensor and actuator may hold."""
     whole = _likelihood(view, view.disturbance)
     found: dict[str, float] = {}
     for i, equation in enumerate(view.vehicle.layout.equations):
         without = view.disturbance.force.at[i].multiply(1e-3)
         found[equation] = max(0.0, whole - _likelihood(view, dataclasses.replace(view.disturbance, force=without)))
-    for effect, statistic, right in zip(candidates, scan.statistic, scan.right, strict=True):
+    for effect, statistic, right in zip(scan.effects, scan.statistic, scan.right, strict=True):
         if right and isinstance(effect, AbstractSensor | AbstractActuator):
             found[effect.where[0]] = max(found.get(effect.where[0], 0.0), 0.5 * float(statistic))
     total = max(sum(found.values()), 1e-300)

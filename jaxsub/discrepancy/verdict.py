@@ -18,13 +18,12 @@ _BEYOND_DOUBT = 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Judged:
-    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader; whether the model improves."""
+    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader; effects that were refused."""
 
     verdict: Verdict
     named: list[Named]
     p_value: float
     notes: list[str]
-    improves: bool = False
     refused: tuple[AbstractEffect, ...] = ()
 
 
@@ -54,7 +53,7 @@ def helped(judged: Judged, effect: AbstractEffect, sound: bool, gain: Luck) -> J
     if sound and gain.helps:
         said = f"With {effect.label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
         said += f"that this is luck has probability {gain.probability:.2g}."
-        return dataclasses.replace(judged, notes=[*judged.notes, said], improves=True)
+        return dataclasses.replace(judged, notes=[*judged.notes, said])
     why = "the held-out runs worse" if sound else "with numbers that physics does not admit"
     said = f"{effect.label} fitted the training runs better but {why}, and is not accepted."
     return dataclasses.replace(judged, notes=[*judged.notes, said], refused=(*judged.refused, effect))
