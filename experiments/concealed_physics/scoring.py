@@ -4,24 +4,19 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 
+from jaxsub.estimate import Rate
+
 MOST_RIVALS = 4
 EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0)
 
 
-def wilson(count: int, of: int, z: float = 1.96) -> list[float] | None:
-    """The 95 % Wilson score interval of a share; None where there were no trials."""
-    if not of:
-        return None
-    share, spread = count / of, z * z / of
-    centre = (share + spread / 2.0) / (1.0 + spread)
-    half = z / (1.0 + spread) * math.sqrt(share * (1.0 - share) / of + spread / (4.0 * of))
-    return [max(0.0, centre - half), min(1.0, centre + half)]
-
-
 def rate(hits: Iterable[bool]) -> dict:
-    """A share with its interval."""
+    """A share with its 95 % interval by Wilson; None where there were no trials."""
     hits = list(hits)
-    return {"rate": sum(hits) / len(hits) if hits else None, "n": len(hits), "interval": wilson(sum(hits), len(hits))}
+    if not hits:
+        return {"rate": None, "n": 0, "interval": None}
+    found = Rate(sum(hits), len(hits))
+    return {"rate": found.share, "n": found.count, "interval": list(found.interval)}
 
 
 def offered(entry: dict, verdict: str) -> list[str]:

@@ -1,6 +1,7 @@
 """What each candidate effect adds to the next sample, per unit of its amplitude, along the motion that took place."""
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 
 import equinox as eqx
@@ -29,35 +30,19 @@ from .view import Trajectory, View
 _NUDGE = 0.1
 
 
-@dataclasses.dataclass(frozen=True)
-class Pieces:
-    """An effect's columns before they meet the model.
-
-    **Fields**
-
-    - `forces`: generalised forces at both ends of each interval, (2, R, K-1, n) a column.
-    - `outputs`: changes of the channels, (R, K, c) a column, SI. One of the two is empty.
-    """
-
-    forces: list[np.ndarray]
-    outputs: list[np.ndarray]
-
-
 def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple[Columns, list[list[int]]]:
     """The columns of all candidates, and which of them each candidate has.
 
     An effect with amplitudes has a column for each. One with none, such as a lag, enters as the whole difference that
     it makes at its grid value, and the difference that a little more of it would make.
     """
-    pieces = [_pieces(view, effect) for effect in candidates]
-    forces = [column for piece in pieces for column in piece.forces]
-    outputs = [column for piece in pieces for column in piece.outputs]
-    owners, pushed, seen = [], 0, len(forces)
-    for piece in pieces:
-        first = pushed if piece.forces else seen
-        count = len(piece.forces) + len(piece.outputs)
-        owners.append(list(range(first, first + count)))
-        pushed, seen = pushed + len(piece.forces), seen + len(piece.outputs)
+    made = [_effect_columns(view, effect) for effect in candidates]
+    shows = [isinstance(effect, AbstractSensor) for effect in candidates]
+    of_sort = lambda shown: [c for own, kind in zip(made, shows, strict=True) if kind is shown for c in own]
+    forces, outputs = of_sort(False), of_sort(True)
+    # forces come first
+    free = {False: itertools.count(), True: itertools.count(len(forces))}
+    owners = [[next(free[kind]) for _ in own] for own, kind in zip(made, shows, strict=True)]
     return force_columns(view, forces) + output_columns(view, outputs), owners
 
 
@@ -81,16 +66,15 @@ def output_columns(view: View, outputs: Sequence[np.ndarray]) -> Columns:
     return Columns(shown, jnp.zeros((*system.A.shape[:3], len(outputs))))
 
 
-def _pieces(view: View, effect: AbstractEffect) -> Pieces:
+def _effect_columns(view: View, effect: AbstractEffect) -> list[np.ndarray]:
+    """Each column of an effect, a force or a change of the channels."""
     names = amplitudes(effect)
     if names:
         units = [with_numbers(effect, {name: float(name == own) for name in names}) for own in names]
-        whole = [difference(view, unit) for unit in units]
-    else:
-        at = difference(view, effect)
-        more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
-        whole = [at, (difference(view, with_numbers(effect, more)) - at) / _NUDGE]
-    return Pieces([], whole) if isinstance(effect, AbstractSensor) else Pieces(whole, [])
+        return [difference(view, unit) for unit in units]
+    at = difference(view, effect)
+    more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
+    return [at, (difference(view, with_numbers(effect, more)) - at) / _NUDGE]
 
 
 def difference(view: View, effect: AbstractEffect) -> np.ndarray:

@@ -148,18 +148,14 @@ class Trial:
 
 def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
     """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
-    tried = [effect for effect in candidates(facts(view), vocabulary) if effect.label not in present(view)]
+    present = {effect.label for effect in view.vehicle.effects}
+    tried = [effect for effect in candidates(facts(view), vocabulary) if effect.label not in present]
     columns, owners = candidate_columns(view, tried)
     evidence = Evidence.of(view, columns)
     naming = name(Selector(evidence, tried, owners), progress)
     progress("looking for forces without a name")
     asked: list[Disturbance] = [evidence.best([])[1].disturbance, naming.products.disturbance]
     return Found(view, naming, pattern(view, evidence, naming.columns, asked))
-
-
-def present(view: View) -> set[str]:
-    """Labels of the effects that a view's vehicle has already."""
-    return {effect.label for effect in view.vehicle.effects}
 
 
 def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:

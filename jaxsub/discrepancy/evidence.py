@@ -60,37 +60,22 @@ class Products:
 
     def predicted(self, chosen: Sequence[int]) -> float:
         """Log likelihood of each part of the recordings, amplitudes and parameters those that the others ask for."""
-        index = [*range(1, self.known), *(self.known + c for c in chosen)]
-        k, total = len(chosen), 0.0
+        index, total = self._index(chosen), 0.0
         for part in self.parts:
-            rest = self.gram - part
-            A = rest[np.ix_(index, index)]
-            A[len(index) - k :, len(index) - k :] += np.eye(k) / self.samples
-            w = np.linalg.solve(A, rest[index, 0])
+            w = np.linalg.solve(self._block(self.gram - part, chosen), (self.gram - part)[index, 0])
             total -= 0.5 * float(part[0, 0] - 2.0 * w @ part[index, 0] + w @ part[np.ix_(index, index)] @ w)
         return total - self.spread
 
-    def solve(self, chosen: Sequence[int]) -> tuple[float, np.ndarray, np.ndarray]:
-        """Log evidence with the candidate columns `chosen`, their amplitudes, and the amplitudes' covariance."""
-        index = [*range(1, self.known), *(self.known + c for c in chosen)]
-        A, b = self.gram[np.ix_(index, index)].copy(), self.gram[index, 0]
-        k = len(chosen)
-        A[-k:, -k:] += np.eye(k) / self.samples if k else 0.0
-        factor = np.linalg.cholesky(A)
-        half = np.linalg.solve(factor, b)
-        logarithm = float(np.sum(np.log(np.diag(factor))))
-        evidence = 0.5 * (half @ half - self.gram[0, 0]) - self.spread - logarithm - 0.5 * k * np.log(self.samples)
-        covariance = np.linalg.inv(A)
-        return evidence, (covariance @ b)[len(index) - k :], covariance[len(index) - k :, len(index) - k :]
+    def log_evidence(self, chosen: Sequence[int]) -> float:
+        """Of the recordings with the candidate columns `chosen` in the model."""
+        factor = np.linalg.cholesky(self._block(self.gram, chosen))
+        half = np.linalg.solve(factor, self.gram[self._index(chosen), 0])
+        occam = float(np.sum(np.log(np.diag(factor)))) + 0.5 * len(chosen) * np.log(self.samples)
+        return 0.5 * (half @ half - self.gram[0, 0]) - self.spread - occam
 
-    def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> "Gains":
+    def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> Gains:
         """What each further candidate would add to `chosen`."""
-        base = [*range(1, self.known), *(self.known + c for c in chosen)]
-        A, k = self.gram[np.ix_(base, base)].copy(), len(chosen)
-        A[len(base) - k :, len(base) - k :] += np.eye(k) / self.samples
-        rest = [0, *range(self.known, len(self.gram))]
-        mixed = self.gram[np.ix_(base, rest)]
-        left = self.gram[np.ix_(rest, rest)] - mixed.T @ np.linalg.solve(A, mixed)
+        left = self._left(chosen)
         evidence, statistic, sizes = [], [], []
         for own in owners:
             at = [1 + c for c in own]
@@ -104,19 +89,34 @@ class Products:
 
     def fall(self, chosen: Sequence[int]) -> float:
         """By how much χ² falls with the candidate columns `chosen`."""
-        index = [*range(1, self.known), *(self.known + c for c in chosen)]
         squares = lambda at: float(self.gram[at, 0] @ np.linalg.lstsq(self.gram[np.ix_(at, at)], self.gram[at, 0])[0])
-        return squares(index) - squares(index[: self.known - 1])
+        return squares(self._index(chosen)) - squares(self._index([]))
+
+    def unabsorbed(self) -> np.ndarray:
+        """(q,) squares of each candidate column that the free parameters cannot absorb."""
+        return np.diag(self._left([]))[1:]
 
     def kept(self, owners: Sequence[Sequence[int]]) -> np.ndarray:
         """The share of each candidate's squares that the free parameters cannot absorb, the least over its columns."""
-        base = list(range(1, self.known))
-        rest = list(range(self.known, len(self.gram)))
-        mixed = self.gram[np.ix_(base, rest)]
-        own = np.diag(self.gram)[rest]
-        left = own - np.sum(mixed * np.linalg.solve(self.gram[np.ix_(base, base)], mixed), axis=0)
-        share = np.where(own > 0.0, left / np.maximum(own, 1e-300), 0.0)
+        own = np.diag(self.gram)[self.known :]
+        share = np.where(own > 0.0, self.unabsorbed() / np.maximum(own, 1e-300), 0.0)
         return np.array([float(np.min(share[list(columns)])) for columns in owners])
+
+    def _index(self, chosen: Sequence[int]) -> list[int]:
+        """Where the free parameters and the candidate columns `chosen` are."""
+        return [*range(1, self.known), *(self.known + c for c in chosen)]
+
+    def _block(self, gram: np.ndarray, chosen: Sequence[int]) -> np.ndarray:
+        """Their products in `gram`, with the priors of the `chosen`."""
+        index = self._index(chosen)
+        worth = np.repeat([0.0, 1.0 / self.samples], [self.known - 1, len(chosen)])
+        return gram[np.ix_(index, index)] + np.diag(worth)
+
+    def _left(self, chosen: Sequence[int]) -> np.ndarray:
+        """(1 + q, 1 + q) products of the residual and all candidates, less what `chosen` and parameters take up."""
+        rest = [0, *range(self.known, len(self.gram))]
+        mixed = self.gram[np.ix_(self._index(chosen), rest)]
+        return self.gram[np.ix_(rest, rest)] - mixed.T @ np.linalg.solve(self._block(self.gram, chosen), mixed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -154,9 +154,7 @@ class Evidence:
 
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
-        picked = jax.tree.map(
-            lambda column: column[..., np.array([*chosen, *[0] * (SLOTS - len(chosen))])], self.columns
-        )
+        picked = self.picked([*chosen, *[0] * (SLOTS - len(chosen))])
         filled = jnp.arange(SLOTS) < len(chosen)
         picked = jax.tree.map(lambda column: jnp.where(filled, column, 0.0), picked)
         samples = float(np.sum(np.asarray(self.view.followed.system.measured)))
@@ -171,6 +169,6 @@ class Evidence:
 
     def best(self, chosen: Sequence[int]) -> tuple[float, Products]:
         """The largest log evidence of `chosen` over the disturbances, and the products where it is."""
-        values = [products.solve(chosen)[0] for products in self.products]
+        values = [products.log_evidence(chosen) for products in self.products]
         best = int(np.argmax(values))
         return values[best], self.products[best]

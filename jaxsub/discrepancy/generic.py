@@ -93,7 +93,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], disturbances: list
     names = [f"a_{j}" for j in range(KNOTS)]
     size = gains.amplitudes[best] / evidence.length[owners[best]]
     force = with_numbers(forces[best], dict(zip(names, size.tolist(), strict=True)))
-    alone = max(p.solve([])[0] + float(np.max(p.gains([], owners).evidence)) for p in evidence.products)
+    alone = max(p.log_evidence([]) + float(np.max(p.gains([], owners).evidence)) for p in evidence.products)
     both = [*held, *owners[best]]
     predicts = evidence.best(both)[1].predicted(both) > products.predicted(held)
     return Pattern(force, p_value, predicts, alone, _explained(evidence, held, owners[best]))

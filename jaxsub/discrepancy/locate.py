@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import VELOCITIES, AbstractActuator, AbstractEffect, AbstractSensor, Motion
+from ..effects import AbstractActuator, AbstractEffect, AbstractSensor, Motion, by_name, velocities
 from ..likelihood import Columns, Disturbance, fitted, smoothed
 from ..recording import Recording
 from .columns import difference, force_columns, output_columns
@@ -80,29 +80,21 @@ def _likelihood(view: View, disturbance: Disturbance) -> float:
 
 def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Disturbance) -> dict[str, float]:
     """How the trace of accepted effects divides among the equations, actuators and sensors they act on."""
-    places, forces, outputs = [], [], []
+    pushed, shown = [], []
     equations = view.vehicle.layout.equations
     for effect in effects:
-        if not isinstance(effect, AbstractSensor | AbstractActuator):
-            whole = difference(view, effect)
-            for i, equation in enumerate(equations):
-                places.append(equation)
-                forces.append(whole * (np.arange(len(equations)) == i))
-    for effect in effects:
-        if isinstance(effect, AbstractActuator):
-            places.append(effect.where[0])
-            forces.append(difference(view, effect))
-    for effect in effects:
+        whole = difference(view, effect)
         if isinstance(effect, AbstractSensor):
-            places.append(effect.where[0])
-            outputs.append(difference(view, effect))
-    columns = force_columns(view, forces) + output_columns(view, outputs)
-    gram = np.asarray(products(disturbance, view.followed.system, view.base + columns, view.prior)[0])
-    p1 = len(view.prior)
-    mixed = gram[1:p1, p1:]
-    left = np.diag(gram)[p1:] - np.sum(mixed * np.linalg.solve(gram[1:p1, 1:p1], mixed), axis=0)
+            shown.append((effect.where[0], whole))
+        elif isinstance(effect, AbstractActuator):
+            pushed.append((effect.where[0], whole))
+        else:
+            pushed += [(e, whole * (np.arange(len(equations)) == i)) for i, e in enumerate(equations)]
+    columns = force_columns(view, [c for _, c in pushed]) + output_columns(view, [c for _, c in shown])
+    evidence = Evidence.of(view, columns, [disturbance])
+    left = evidence.products[0].unabsorbed() * evidence.length**2
     found: dict[str, float] = {}
-    for place, part in zip(places, np.maximum(left, 0.0), strict=True):
+    for (place, _), part in zip([*pushed, *shown], np.maximum(left, 0.0), strict=True):
         found[place] = found.get(place, 0.0) + float(part)
     total = max(sum(found.values()), 1e-300)
     return {place: part / total for place, part in found.items()}
@@ -158,10 +150,9 @@ def grows_with(view: View, equation: str, most: int = 3) -> list[str]:
 
 def motion_variables(motion: Motion) -> dict[str, np.ndarray]:
     """What a force may grow with: velocities, positions, inputs, their sizes and products, each (R, K-1)."""
-    rates = {VELOCITIES.get(e, f"{e}_rate"): np.asarray(v) for e, v in motion.rates.items()}
-    others = {k: np.asarray(v) for k, v in (motion.positions | motion.actuators | motion.environment).items()}
-    moving = {k: v for k, v in (rates | others).items() if np.ndim(v) == 2 and np.std(v) > 1e-9}
-    grown = {k: v for k, v in moving.items() if k in rates}
+    named = {name: np.asarray(value) for name, value in by_name(motion).items()}
+    moving = {k: v for k, v in named.items() if np.ndim(v) == 2 and np.std(v) > 1e-9}
+    grown = {k: v for k, v in moving.items() if k in velocities(motion)}
     variables = dict(moving)
     variables |= {f"abs({k})": np.abs(v) for k, v in moving.items()}
     variables |= {f"{k}*abs({k})": v * np.abs(v) for k, v in grown.items()}

@@ -62,7 +62,7 @@ class Naming:
 
     - `products`: at the disturbance that is left. `columns`: of what was chosen. `value`: its log evidence.
     - `first`: the scan before any choice; `candidates`: its lines for the report.
-    - `first_p`, `last_p`: p-values of the first choice and of what is left.
+    - `first_p`: p-value of the first choice.
     """
 
     named: list[Named]
@@ -72,7 +72,6 @@ class Naming:
     first: Scan
     candidates: list[Candidate]
     first_p: float
-    last_p: float
 
 
 class Selector:
@@ -80,9 +79,8 @@ class Selector:
 
     def __init__(self, evidence: Evidence, candidates: Sequence[AbstractEffect], owners: Sequence[Sequence[int]]):
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
-        kept = evidence.products[0].kept(self.owners)
-        self.usable = np.isfinite(kept) & (kept > _ABSORBED)
-        self.shares = kept
+        self.kept = evidence.products[0].kept(self.owners)
+        self.usable = np.isfinite(self.kept) & (self.kept > _ABSORBED)
         self.estimated: set[tuple[int, ...]] = set()
 
     def columns(self, chosen: Sequence[int]) -> list[int]:
@@ -108,7 +106,7 @@ class Selector:
         best, statistic = np.full(len(self.candidates), -np.inf), np.zeros(len(self.candidates))
         sizes: list[np.ndarray] = [np.zeros(len(columns)) for columns in self.owners]
         for products in self.evidence.products:
-            gains, at = products.gains(own, self.owners), products.solve(own)[0]
+            gains, at = products.gains(own, self.owners), products.log_evidence(own)
             values = at + gains.evidence
             for i in np.flatnonzero(values > best):
                 # twice the gain in likelihood, the disturbances of both their own
@@ -206,7 +204,7 @@ def name(selector: Selector, progress: Progress) -> Naming:
     value, products = selector.evidence.best(selector.columns(chosen))
     named = [_named(selector, chosen, i) for i in chosen]
     lines = table(selector, scans[0])
-    return Naming(named, products, selector.columns(chosen), value, scans[0], lines, p_values[0], p_values[-1])
+    return Naming(named, products, selector.columns(chosen), value, scans[0], lines, p_values[0])
 
 
 def _named(selector: Selector, chosen: list[int], index: int) -> Named:
@@ -239,7 +237,7 @@ def table(selector: Selector, scan: Scan) -> list[Candidate]:
         symbols = effect.symbols()
         predicted = {symbols[field]: value for field, value in numbers(effect).items()}
         p_value = selector.p_value(statistic, columns)
-        kept = float(selector.shares[i]) if selector.usable[i] else 0.0
+        kept = float(selector.kept[i]) if selector.usable[i] else 0.0
         said = _outcome(bool(selector.usable[i]), bool(scan.right[i]), p_value)
         line = Candidate(effect.name, effect.label, statistic, columns, p_value, predicted, kept, said)
         lines.setdefault(f"{effect.label} {sorted(symbols.values())}", line)

@@ -25,7 +25,19 @@ from .hull_damping import CubicDamping, QuadraticDamping
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
 from .mechanisms import CoulombFriction, CubicStiffness, Saturation
 from .memory import AbstractMemory, FluidMemory, Hysteresis, with_memory
-from .motion import CHANNEL_UNITS, EQUATIONS, FORCES, GRAVITY, VELOCITIES, Facts, Motion, Signal, unit_per
+from .motion import (
+    CHANNEL_UNITS,
+    EQUATIONS,
+    FORCES,
+    GRAVITY,
+    VELOCITIES,
+    Facts,
+    Motion,
+    Signal,
+    by_name,
+    unit_per,
+    velocities,
+)
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
 from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
@@ -97,6 +109,7 @@ __all__ = [
     "admissible",
     "amplitude",
     "amplitudes",
+    "by_name",
     "candidates",
     "from_script",
     "number_fields",
@@ -106,6 +119,7 @@ __all__ = [
     "shape",
     "unit_per",
     "variables",
+    "velocities",
     "vocabulary",
     "with_memory",
     "with_numbers",

@@ -13,12 +13,6 @@ from .base import AbstractActuator, amplitude, shape
 from .motion import Facts
 
 
-def _largest(facts: Facts) -> dict[str, float]:
-    """The largest command of each actuator that moved."""
-    sizes = {name: facts.input_range[name][1] for name in facts.actuators if name in facts.input_range}
-    return {name: size for name, size in sizes.items() if size > 0.0}
-
-
 class ActuatorSaturation(AbstractActuator):
     r"""A stop: $|\delta| \le \delta_{max}$, $\delta_{max} > 0$ in the actuator's unit. Source: Fossen (2021), §9.5."""
 
@@ -31,7 +25,7 @@ class ActuatorSaturation(AbstractActuator):
     def candidates(cls, facts: Facts) -> "Sequence[ActuatorSaturation]":
         """Each actuator with limits from half to nine tenths of its largest command."""
         parts = (0.5, 0.6, 0.7, 0.8, 0.9)
-        return [cls(name, number(part * size)) for name, size in _largest(facts).items() for part in parts]
+        return [cls(name, number(part * size)) for name, size in facts.largest_commands.items() for part in parts]
 
     @property
     def expression(self) -> str:
@@ -59,7 +53,7 @@ class ActuatorDeadband(AbstractActuator):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[ActuatorDeadband]":
         """Each actuator with bands of a few to forty per cent of its largest command."""
-        return [cls(name, number(part * size)) for name, size in _largest(facts).items() for part in PARTS]
+        return [cls(name, number(part * size)) for name, size in facts.largest_commands.items() for part in PARTS]
 
     @property
     def expression(self) -> str:

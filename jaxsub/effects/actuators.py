@@ -155,8 +155,7 @@ class ActuatorBacklash(AbstractActuator):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[ActuatorBacklash]":
         """Each actuator with gaps of a few to forty per cent of its largest command."""
-        largest = {name: facts.input_range[name][1] for name in facts.actuators if name in facts.input_range}
-        return [cls(name, number(part * size)) for name, size in largest.items() if size > 0.0 for part in PARTS]
+        return [cls(name, number(part * size)) for name, size in facts.largest_commands.items() for part in PARTS]
 
     @property
     def expression(self) -> str:

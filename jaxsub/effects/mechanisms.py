@@ -96,9 +96,8 @@ class Saturation(AbstractForce):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[Saturation]":
         """Each coordinate of a mechanism, levelling off at a tenth of how far it went to all of it."""
-        far = facts.position_scale if facts.kind == "mechanism" else {}
         parts = (0.1, 0.2, 0.4, 0.7, 1.0)
-        return [cls(e, x_s=number(part * far[e])) for e in facts.equations if far.get(e, 0.0) > 0.0 for part in parts]
+        return [cls(e, x_s=number(part * far)) for e, far in facts.travel.items() for part in parts]
 
     @property
     def where(self) -> tuple[str, ...]:

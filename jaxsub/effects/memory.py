@@ -102,9 +102,8 @@ class Hysteresis(AbstractMemory):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[Hysteresis]":
         """Each coordinate of a mechanism, with yield distances up to half of how far it went."""
-        far = facts.position_scale if facts.kind == "mechanism" else {}
         parts = (0.02, 0.05, 0.1, 0.2, 0.5)
-        return [cls(e, x_y=number(part * far[e])) for e in facts.equations if far.get(e, 0.0) > 0.0 for part in parts]
+        return [cls(e, x_y=number(part * far)) for e, far in facts.travel.items() for part in parts]
 
     @property
     def where(self) -> tuple[str, ...]:

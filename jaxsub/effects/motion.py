@@ -59,6 +59,16 @@ class Motion(eqx.Module):
     accelerations: dict[str, Signal] = eqx.field(default_factory=dict)
 
 
+def velocities(motion: Motion) -> dict[str, Signal]:
+    """Rates by the name that their user knows: `u` for surge, `q_rate` for a mechanism's coordinate `q`."""
+    return {VELOCITIES.get(equation, f"{equation}_rate"): rate for equation, rate in motion.rates.items()}
+
+
+def by_name(motion: Motion) -> dict[str, Signal]:
+    """All that a force may follow: velocities, positions, actuators, surroundings."""
+    return velocities(motion) | motion.positions | motion.actuators | motion.environment
+
+
 class Facts(eqx.Module):
     """What the vocabulary needs to know of a vehicle and its recordings to list its candidates.
 
@@ -92,6 +102,18 @@ class Facts(eqx.Module):
     input_range: dict[str, tuple[float, float, float]] = eqx.field(default_factory=dict)
     output_range: dict[str, tuple[float, float]] = eqx.field(default_factory=dict)
     depth_range: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def largest_commands(self) -> dict[str, float]:
+        """The largest size of the command of each actuator that moved."""
+        sizes = {name: self.input_range[name][1] for name in self.actuators if name in self.input_range}
+        return {name: size for name, size in sizes.items() if size > 0.0}
+
+    @property
+    def travel(self) -> dict[str, float]:
+        """How far each coordinate of a mechanism went, of those that moved."""
+        far = self.position_scale if self.kind == "mechanism" else {}
+        return {e: far[e] for e in self.equations if far.get(e, 0.0) > 0.0}
 
     @property
     def fins(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array
 
 from .base import AbstractForce, amplitude
-from .motion import FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
+from .motion import FORCES, Facts, Motion, Signal, by_name, unit_per
 
 KNOTS = 12
 
@@ -73,8 +73,7 @@ def variables(motion: Motion) -> dict[str, Signal]:
 
     A heading is taken within a turn, (-π, π].
     """
-    rates: dict[str, Signal] = {VELOCITIES.get(e, f"{e}_rate"): rate for e, rate in motion.rates.items()}
-    found = rates | motion.positions | motion.actuators | motion.environment
+    found = by_name(motion)
     if "psi" in found:
         found["psi"] = jnp.arctan2(jnp.sin(found["psi"]), jnp.cos(found["psi"]))
     return found

@@ -19,7 +19,7 @@ from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
 from ..recording.runs import Runs
-from .sensitivity import Linearised, propagate
+from .sensitivity import Jacobians, Linearised, propagate
 
 
 class Disturbance(eqx.Module):
@@ -54,7 +54,9 @@ class System(eqx.Module):
     spread: Float[Array, " s"]
 
     @classmethod
-    def of(cls, model: Linearised, runs: Runs, sigma: Float[Array, " c"], spread: Float[Array, " s"]) -> "System":
+    def of(
+        cls, model: Linearised | Jacobians, runs: Runs, sigma: Float[Array, " c"], spread: Float[Array, " s"]
+    ) -> "System":
         """A linearised model on `runs`, its channels in units of `sigma`."""
         C = model.C * (runs.mask / sigma)[..., None]
         return cls(model.A, model.G, C, runs.mask, runs.steps[runs.step_of], spread)
@@ -151,14 +153,21 @@ def whitened(
 
 
 def transition(disturbance: Disturbance, system: System) -> tuple[Float[Array, "r k1 z z"], Float[Array, "r k1 z n"]]:
-    """F and B of z ← F z + B w for z = [x, d]."""
-    s, n = system.A.shape[-1], len(disturbance.force)
-    rho = jnp.exp(-system.intervals[..., None] / disturbance.time)
+    """F and B of z ← F z + B w for z = [x, d] in every step of a system."""
+    return augmented(disturbance, system.A, system.G, system.intervals)
+
+
+def augmented(
+    disturbance: Disturbance, A: Float[Array, "*k s s"], G: Float[Array, "*k s n2"], interval: Float[Array, " *k"]
+) -> tuple[Float[Array, "*k z z"], Float[Array, "*k z n"]]:
+    """F and B of z ← F z + B w for z = [x, d], where x follows A and the force's start and end G (`System`)."""
+    s, n = A.shape[-1], len(disturbance.force)
+    rho = jnp.exp(-interval[..., None] / disturbance.time)
     fresh = disturbance.force * jnp.sqrt(1.0 - rho**2)
-    begin, end = system.G[..., :n], system.G[..., n:]
-    empty = jnp.zeros((*system.intervals.shape, s + n, s + n))
+    begin, end = G[..., :n], G[..., n:]
+    empty = jnp.zeros((*interval.shape, s + n, s + n))
     diagonal = jnp.eye(n) * rho[..., None]
-    F = empty.at[..., :s, :s].set(system.A).at[..., :s, s:].set(begin + end * rho[..., None, :])
+    F = empty.at[..., :s, :s].set(A).at[..., :s, s:].set(begin + end * rho[..., None, :])
     B = jnp.concatenate([end, jnp.broadcast_to(jnp.eye(n), diagonal.shape)], axis=-2) * fresh[..., None, :]
     return F.at[..., s:, s:].set(diagonal), B
 

@@ -20,7 +20,7 @@ from ..effects import AbstractSensor
 from ..recording.runs import Runs
 from ..simulate import Sampled
 from ..vehicle import AbstractVehicle
-from .disturbance import Columns, Disturbance, System
+from .disturbance import Columns, Disturbance, System, augmented
 from .sensitivity import jacobians
 
 
@@ -61,9 +61,7 @@ def follow(
     kept = jnp.exp(-runs.steps[runs.step_of][..., None] / disturbance.time) * force[:, :-1]
     push = jnp.stack([force[:, :-1], kept], axis=2)
     by = jacobians(vehicle, runs, filtered[:, :-1], expected, push)
-    shown = (runs.mask / sigma)[..., None]
-    intervals = runs.steps[runs.step_of]
-    system = System(by.A, by.G, by.C * shown, runs.mask, intervals, spread)
+    system = System.of(by, runs, sigma, spread)
     error = vehicle.deviation(runs.outputs, vehicle.measure(runs.times, expected, runs.signals))
     # the path was led by its corrections and by the force; a free path from the expected state would not have been
     led = jnp.einsum("rkst,rkt->rks", by.A, (filtered - expected)[:, :-1])
@@ -95,20 +93,16 @@ def _path(
 
     def predict(m: Array, P: Array, node: Array, index: Array, live: Array) -> tuple[Array, Array]:
         interval = runs.steps[index]
-        rho = jnp.exp(-interval / disturbance.time)
-        fresh = disturbance.force * jnp.sqrt(1.0 - rho**2)
+        d, later = m[s:], jnp.exp(-interval / disturbance.time) * m[s:]
 
         def step(z: Array) -> Array:
             x, begin, end = jnp.split(z, [s, s + n])
             return sampled.step(x, node, index, jnp.stack([begin, end]))
 
-        at = jnp.concatenate([m, rho * m[s:]])
-        moved, push = jax.linearize(step, at)
-        by = jax.vmap(push, out_axes=-1)(jnp.eye(len(at), dtype=at.dtype))
-        A, begin, end = by[:, :s], by[:, s : s + n], by[:, s + n :]
-        F = jnp.block([[A, begin + end * rho], [jnp.zeros((n, s)), jnp.diag(rho)]])
-        B = jnp.concatenate([end, jnp.eye(n)]) * fresh
-        after = jnp.concatenate([moved, rho * m[s:]]), F @ P @ F.T + B @ B.T
+        moved, push = jax.linearize(step, jnp.concatenate([m[:s], d, later]))
+        A, G = jnp.split(jax.vmap(push, out_axes=-1)(jnp.eye(s + 2 * n, dtype=m.dtype)), [s], axis=1)
+        F, B = augmented(disturbance, A, G, interval)
+        after = jnp.concatenate([moved, later]), F @ P @ F.T + B @ B.T
         return jax.tree.map(lambda new, old: jnp.where(live, new, old), after, (m, P))
 
     def advance(carry: tuple[Array, Array], sample: tuple) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
