@@ -17,7 +17,7 @@ from jaxsub.cli import session
 from .assemble import assemble, is_right
 from .figures import draw
 from .plan import COUNTS, Case, ordered
-from .work import work
+from .work import on_own_core, work
 
 # a process may hold so many compiled programs and no more
 _CASES_A_PROCESS = 6
@@ -47,7 +47,9 @@ def main() -> None:
 def run(todo: list[Case], path: Path, jobs: int) -> None:
     """Append a line for each case of `todo` as soon as it is there."""
     spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=spawn, max_tasks_per_child=_CASES_A_PROCESS) as pool:
+    order = spawn.Value("i", 0)
+    own = {"initializer": on_own_core, "initargs": (order,)} if jobs > 1 else {}
+    with ProcessPoolExecutor(jobs, mp_context=spawn, max_tasks_per_child=_CASES_A_PROCESS, **own) as pool:
         for number, future in enumerate(as_completed([pool.submit(work, case) for case in todo]), 1):
             line = future.result()
             with path.open("a", encoding="utf-8") as file:

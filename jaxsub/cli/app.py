@@ -56,14 +56,21 @@ def identify(vehicle: Path, runs: tuple[Path, ...], out: Path, method: str, over
 @_out(required=True)
 @click.option("--hold-out", type=_PATH, multiple=True, help="A run to judge by and not to fit; repeatable.")
 @click.option("--effects", type=_PATH, help="A Python script with effects of your own, to be tried too.")
+@click.option("--manoeuvre/--no-manoeuvre", default=True, help="Where rivals remain, look for the run that settles it.")
 @_overwrite
 def diagnose(
-    vehicle: Path, runs: tuple[Path, ...], out: Path, hold_out: tuple[Path, ...], effects: Path | None, overwrite: bool
+    vehicle: Path,
+    runs: tuple[Path, ...],
+    out: Path,
+    hold_out: tuple[Path, ...],
+    effects: Path | None,
+    manoeuvre: bool,
+    overwrite: bool,
 ) -> None:
     """Fit, locate the mismatch, name the missing physics, model it, and show it on held-out runs."""
     from . import diagnose as command
 
-    command.run(vehicle, runs, hold_out, out, overwrite, effects)
+    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre)
 
 
 @app.command()

@@ -1,5 +1,6 @@
 """`jaxsub diagnose`: the whole path."""
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,12 +10,15 @@ from rich.text import Text
 
 from ..discrepancy import Diagnosis
 from ..discrepancy import diagnose as diagnose_runs
+from ..discrepancy.next_run import next_run, said
 from ..effects import AbstractEffect, from_script, vocabulary
-from ..recording import Recording, hold_out
+from ..recording import Recording, hold_out, save
 from ..report import write_report
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
 from . import session
 from .output import fresh_folder, refuse_existing
+
+_NEXT = "next_manoeuvre.csv"
 
 
 def run(
@@ -24,6 +28,7 @@ def run(
     out: Path,
     overwrite: bool,
     script: Path | None = None,
+    manoeuvre: bool = True,
 ) -> None:
     """Diagnose the recordings at `runs`, judged on those at `held` or on what `hold_out` sets aside.
 
@@ -36,7 +41,7 @@ def run(
     recordings = session.load_runs(runs, vehicle)
     train, judged = (recordings, session.load_runs(held, vehicle)) if held else hold_out(recordings)
     with fresh_folder(out, overwrite) as folder:
-        diagnosis = write_diagnosis(vehicle, train, judged, folder, (*vocabulary(), *own))
+        diagnosis = write_diagnosis(vehicle, train, judged, folder, (*vocabulary(), *own), manoeuvre)
     show(diagnosis, out)
 
 
@@ -46,16 +51,33 @@ def write_diagnosis(
     held: Sequence[Recording],
     folder: Path,
     kinds: tuple[type[AbstractEffect], ...] | None = None,
+    manoeuvre: bool = True,
 ) -> Diagnosis:
-    """Diagnose, and write `diagnosis.json`, `improved.toml`, `report.html` and `figures/` into `folder`."""
+    """Diagnose, and write `diagnosis.json`, `improved.toml`, `report.html` and `figures/` into `folder`.
+
+    Where rivals remain and a `manoeuvre` is wanted, `next_manoeuvre.csv` holds inputs that would tell them apart.
+    """
     with session.progress(f"diagnosing {vehicle.layout.name}") as told:
         diagnosis, improved = diagnose_runs(vehicle, train, held, vocabulary=kinds, progress=told)
+        if manoeuvre:
+            told("looking for the manoeuvre that would settle it")
+            diagnosis = _with_next_run(diagnosis, train, folder)
         told("writing the report")
         text = vehicle_text(improved, f"{vehicle.layout.name}, improved by jaxsub\n{diagnosis.summary}")
         (folder / "improved.toml").write_text(text, encoding="utf-8")
         (folder / "diagnosis.json").write_text(json.dumps(diagnosis.to_json(), indent=1), encoding="utf-8")
         write_report(diagnosis, text, folder)
     return diagnosis
+
+
+def _with_next_run(diagnosis: Diagnosis, train: Sequence[Recording], folder: Path) -> Diagnosis:
+    """The diagnosis with what is said of the next manoeuvre, which is written beside it."""
+    found = next_run(diagnosis, train)
+    if found is None:
+        return diagnosis
+    save(found.recording, folder / _NEXT)
+    text = f"{diagnosis.next_manoeuvre or ''}. {said(found, _NEXT)}"
+    return dataclasses.replace(diagnosis, next_manoeuvre=text.removeprefix(". "))
 
 
 def show(diagnosis: Diagnosis, out: Path) -> None:

@@ -1,18 +1,14 @@
 """The whole path: fit, locate, name, model, show."""
 
-import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array
 
 from ..effects import AbstractEffect, candidates
 from ..errors import InputError
 from ..estimate import Fit, fit
 from ..likelihood import Disturbance
 from ..recording import Recording
-from ..recording.runs import Runs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .advice import next_manoeuvre
@@ -20,24 +16,20 @@ from .batch import batch
 from .columns import candidate_columns
 from .diagnosis import Diagnosis, Location, Physics, Rival
 from .evidence import Evidence
-from .generic import Pattern, pattern
+from .generic import pattern
 from .locate import Field, effect_shares, locations, shares, traces
-from .model import allowing_for, join, sound
-from .name import Named, Naming, Selector, name
+from .model import allowing_for
+from .name import Named, name
 from .process_noise import noise_note, noise_signals
 from .progress import Progress
-from .show import HeldOut, channel_quality, coefficients, estimates, hold, luck, overlays, run_quality
-from .verdict import Judged, helped, judge, settled, summary
+from .selector import Selector
+from .show import channel_quality, coefficients, estimates, overlays, run_quality
+from .trial import Found, Model, Trial, tried, unnamed
+from .verdict import NOTHING, Judged, both, judge, summary
 from .view import View, facts, look
 
-
-@dataclasses.dataclass(frozen=True)
-class Found:
-    """What the vocabulary and an anonymous force say about the recordings from one view of them."""
-
-    view: View
-    naming: Naming
-    pattern: Pattern | None
+# that a next manoeuvre is to tell from what was named
+_RIVALS = 2
 
 
 def diagnose(
@@ -54,39 +46,60 @@ def diagnose(
     what is being done. **Raises** `InputError` where the recordings lack a column, or the model does not run from the
     vehicle file's values.
     """
-    layout, size = vehicle.layout, len(train)
+    size = len(train)
     runs = batch(vehicle, [*train, *held])
-    seen, chosen = runs.take(range(size), size), range(size, size + len(held))
     progress("fitting the baseline")
-    start = fit(vehicle, seen)
+    start = fit(vehicle, runs.take(range(size), size))
     if bool(start.result == RESULTS.nan_start):
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
-        raise InputError(layout.name, "the model does not run from its starting values", remedy)
+        raise InputError(vehicle.layout.name, "the model does not run from its starting values", remedy)
     progress("following the recordings")
     found = examine(look(start), vocabulary, progress)
-    view, naming = found.view, found.naming
     signals = noise_signals(start, train)
-    field = Field(shares(view, naming.first), traces(view, train), signals)
+    field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
     progress("free runs through what the fit did not see")
-    trial = Trial(runs, chosen, size, start.sigma, start)
-    before = trial.held_out(start, view.disturbance)
-    judged = judge(naming, found.pattern)
-    added: list[AbstractEffect] = [named.effect for named in judged.named]
-    if judged.verdict == "unknown" and found.pattern is not None and found.pattern.significant:
-        added = [found.pattern.force]
-    best = Model(start, view, before, ())
-    # one after the other, since what fails on runs that were not fitted must not take with it what stands
-    for effect in added:
-        more = trial.with_effects(found, (*best.added, effect), progress)
-        judged = helped(judged, effect, sound(more.fit, more.added), luck(best.shown, more.shown))
-        if effect not in judged.refused:
-            best = more
-    judged = settled(judged)
-    after, remaining = best.shown, best.view
-    baseline = allowing_for(view, start)
-    improved = allowing_for(remaining, best.fit) if best.added else baseline
-    where = _where(judged, found, field, train)
+    trial = Trial(runs, range(size, size + len(held)), size, start.sigma, progress)
+    baseline = Model(start, found.view, trial.held_out(start, found.view.disturbance), ())
+    best, judged = explained(trial, baseline, found, vocabulary)
+    return _told(vehicle, train, held, found, field, baseline, best, judged)
+
+
+def explained(
+    trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
+) -> tuple[Model, Judged]:
+    """The best model, and what is to be said: looked at again where a free run asked for an effect that then stands."""
+    best, judged = baseline, NOTHING
+    while True:
+        said = judge(found.naming, found.pattern)
+        if said.named:
+            best, said = tried(trial, best, found, said)
+        elif said.verdict == "unknown" and not best.added:
+            # it stands for all that is missing, and not beside what was named
+            best, said = unnamed(trial, best, found, said)
+        judged = both(judged, said)
+        if not (found.naming.again and said.named):
+            return best, judged
+        found = examine(best.view, vocabulary, trial.progress)
+
+
+def _told(
+    vehicle: AbstractVehicle,
+    train: Sequence[Recording],
+    held: Sequence[Recording],
+    first: Found,
+    field: Field,
+    baseline: Model,
+    best: Model,
+    judged: Judged,
+) -> tuple[Diagnosis, AbstractVehicle]:
+    """The diagnosis, and the improved vehicle."""
+    layout, before, after = vehicle.layout, baseline.shown, best.shown
+    start = allowing_for(baseline.view, baseline.fit)
+    improved = allowing_for(best.view, best.fit) if best.added else start
+    where = _where(judged, first, field, train)
     physics = [_physics(named, improved) for named in judged.named]
+    models = [("baseline", before), *([("improved", after)] if best.added else [])]
+    in_units = lambda rms: {c: value * float(s) for (c, value), s in zip(rms.items(), start.sigma, strict=True)}
     diagnosis = Diagnosis(
         verdict=judged.verdict,
         vehicle=layout.name,
@@ -95,67 +108,37 @@ def diagnose(
         where=where,
         physics=physics,
         fit={
-            "train": {"baseline": baseline.rms, "improved": improved.rms},
+            "train": {"baseline": start.rms, "improved": improved.rms},
             "held_out": {"baseline": before.rms, "improved": after.rms},
         },
-        candidates=naming.candidates,
+        candidates=first.naming.candidates,
         forces=field.traces,
-        remaining_forces=field.traces if remaining is view else traces(remaining, train),
+        remaining_forces=traces(best.view, train) if best.added else field.traces,
         overlays=overlays(held, layout.channels, before, after),
-        coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, baseline, improved),
+        coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, start, improved),
         channels=channel_quality(improved),
         runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
-        notes=[*judged.notes, *disturbance_note(remaining), *noise_note(signals)],
+        notes=[*judged.notes, *disturbance_note(best.view), *noise_note(field.signals)],
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
-        history=[
-            (label, {c: rms * float(s) for (c, rms), s in zip(seen.rms.items(), start.sigma, strict=True)})
-            for label, seen in [("baseline", before), *([("improved", after)] if improved is not baseline else [])]
-        ],
+        history=[(label, in_units(shown.rms)) for label, shown in models],
+        explanations=_explanations(judged, improved.vehicle),
     )
     return diagnosis, improved.vehicle
-
-
-class Model(NamedTuple):
-    """A fit, its view, what it shows on the held-out runs, and the effects that were added to the baseline."""
-
-    fit: Fit
-    view: View
-    shown: HeldOut
-    added: tuple[AbstractEffect, ...]
-
-
-@dataclasses.dataclass(frozen=True)
-class Trial:
-    """The runs that no fit saw: numbers `chosen` of `runs`, of which the first `size` were fitted."""
-
-    runs: Runs
-    chosen: Sequence[int]
-    size: int
-    sigma: Array
-    start: Fit
-
-    def with_effects(self, found: Found, effects: tuple[AbstractEffect, ...], progress: Progress) -> Model:
-        """The baseline with `effects`, fitted again and tried."""
-        progress(f"fitting with {', '.join(effect.label for effect in effects)}")
-        joined = join(found.view, self.start, effects)
-        view = look(joined, found.naming.products.disturbance)
-        return Model(joined, view, self.held_out(joined, view.disturbance), effects)
-
-    def held_out(self, fit: Fit, disturbance: Disturbance) -> HeldOut:
-        """A fit's vehicle on them."""
-        return hold(fit.vehicle, self.runs, self.chosen, self.size, self.sigma, disturbance)
 
 
 def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
     """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
     present = {effect.label for effect in view.vehicle.effects}
-    tried = [effect for effect in candidates(facts(view), vocabulary) if effect.label not in present]
-    columns, owners = candidate_columns(view, tried)
+    listed = [effect for effect in candidates(facts(view), vocabulary) if effect.label not in present]
+    columns, owners = candidate_columns(view, listed)
     evidence = Evidence.of(view, columns)
-    naming = name(Selector(evidence, tried, owners), progress)
+    selector = Selector(evidence, listed, owners)
+    naming = name(selector, progress)
+    if naming.again:
+        return Found(view, selector, naming, None)
     progress("looking for forces without a name")
     asked: list[Disturbance] = [evidence.best([])[1].disturbance, naming.products.disturbance]
-    return Found(view, naming, pattern(view, evidence, naming.columns, asked))
+    return Found(view, selector, naming, pattern(view, evidence, naming.columns, asked))
 
 
 def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:
@@ -171,6 +154,16 @@ def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording
         share = {place: 0.5 * part for place, part in share.items()}
         share[own] = share.get(own, 0.0) + 0.5
     return locations(field, view, train, share)
+
+
+def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVehicle, ...]:
+    """The improved vehicle and those with a rival in the place of what is least certain; none where nothing is."""
+    if judged.verdict != "ambiguous":
+        return ()
+    least = min(judged.named, key=lambda named: named.probability)
+    without = improved.without_effect(least.effect.label)
+    rivals = [rival for rival, _ in least.rivals[:_RIVALS]]
+    return (improved, *(without.with_effect(rival) for rival in rivals))
 
 
 def _physics(named: Named, improved: Fit) -> Physics:

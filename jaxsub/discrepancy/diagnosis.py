@@ -5,6 +5,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..vehicle import AbstractVehicle
+
 Verdict = Literal["none", "named", "ambiguous", "unknown"]
 
 
@@ -139,7 +141,8 @@ class Diagnosis:
     `history` is (`baseline` or the label of the effect accepted next, held-out rms error by channel in SI). `fit`
     maps `train` and `held_out` to `baseline` and `improved` to rms(residual)/σ by channel. `p_value` is that of
     the whole mismatch, corrected for everything tried. `summary` is the verdict in one sentence, `notes` what a
-    reader must know besides.
+    reader must know besides. `explanations` are the vehicles that explain the recordings about as well where the
+    verdict is `ambiguous`: the improved one, and those with a rival in the place of what is least certain.
     """
 
     verdict: Verdict
@@ -159,6 +162,7 @@ class Diagnosis:
     notes: list[str]
     next_manoeuvre: str | None
     history: list[tuple[str, dict[str, float]]] = dataclasses.field(default_factory=list)
+    explanations: tuple[AbstractVehicle, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The contents of `diagnosis.json`."""

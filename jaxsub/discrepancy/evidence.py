@@ -16,18 +16,23 @@ import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
-from ..estimate import estimate_disturbance
-from ..likelihood import Columns, Disturbance
-from .view import View, block_products, lengths
+from ..estimate import FROM_NEAR, estimate_disturbance
+from ..likelihood import Columns, Disturbance, System, block_products
+from .columns import force_columns
+from .view import View, lengths
 
 # columns that a chosen set may have: the program for its disturbance then has one shape
 SLOTS = 8
 # parts of the recordings, each to be predicted from the others
 _PARTS = 4
+# blocks that each part of a run is filtered in: memory is that of one
+_BLOCKS = 4
 # shares of the disturbance that the model without candidates asks for: what was left out may be part or all of it
 _SHARES = (1.0, 0.1, 0.003)
 
@@ -92,6 +97,10 @@ class Products:
         squares = lambda at: float(self.gram[at, 0] @ np.linalg.lstsq(self.gram[np.ix_(at, at)], self.gram[at, 0])[0])
         return squares(self._index(chosen)) - squares(self._index([]))
 
+    def explained(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> np.ndarray:
+        """The share of what `chosen` leave of χ² that each further candidate explains."""
+        return self.gains(chosen, owners).statistic / max(float(self._left(chosen)[0, 0]), 1e-300)
+
     def unabsorbed(self) -> np.ndarray:
         """(q,) squares of each candidate column that the free parameters cannot absorb."""
         return np.diag(self._left([]))[1:]
@@ -121,10 +130,11 @@ class Products:
 
 @dataclasses.dataclass(frozen=True)
 class Evidence:
-    """A view, the columns of all candidates in units of their length, and their products under several disturbances."""
+    """A view, the columns of all candidates in units of their length (`whole`: after the view's own), and products."""
 
     view: View
     columns: Columns
+    whole: Columns
     length: np.ndarray
     products: list[Products]
 
@@ -133,7 +143,7 @@ class Evidence:
         """Under the given disturbances, or shares of the view's."""
         length = lengths(view.disturbance, view.followed.system, columns)
         scaled = jax.tree.map(lambda column: column / length, columns)
-        made = cls(view, scaled, np.asarray(length), [])
+        made = cls(view, scaled, view.base + scaled, np.asarray(length), [])
         own = view.disturbance
         shares = [dataclasses.replace(own, force=share * own.force) for share in _SHARES]
         for disturbance in disturbances or shares:
@@ -145,7 +155,7 @@ class Evidence:
         view = self.view
         system = view.followed.system
         pieces = max(1, -(-_PARTS // len(system.measured)))
-        found, spread = block_products(disturbance, system, view.base + self.columns, pieces)
+        found, spread = _parts(disturbance, system, self.whole, pieces)
         parts, known = np.asarray(found), len(view.prior)
         gram = parts.sum(axis=0)
         gram[:known, :known] += np.asarray(view.prior)
@@ -160,7 +170,7 @@ class Evidence:
         samples = float(np.sum(np.asarray(self.view.followed.system.measured)))
         worth = jnp.where(filled, 1.0 / samples, 1.0)
         prior = jax.scipy.linalg.block_diag(self.view.prior, jnp.diag(worth))
-        found = estimate_disturbance(self.view.followed.system, self.view.base + picked, prior, start)
+        found = estimate_disturbance(self.view.followed.system, self.view.base + picked, prior, start, FROM_NEAR)
         return self.under(found)
 
     def picked(self, chosen: Sequence[int]) -> Columns:
@@ -172,3 +182,19 @@ class Evidence:
         values = [products.log_evidence(chosen) for products in self.products]
         best = int(np.argmax(values))
         return values[best], self.products[best]
+
+
+@eqx.filter_jit
+def _parts(
+    disturbance: Disturbance, system: System, columns: Columns, pieces: int
+) -> tuple[Float[Array, "m q q"], Float[Array, ""]]:
+    """Products of all columns whitened in `pieces` of every run, and half the log-determinant of all."""
+    found, spread = block_products(disturbance, system, columns, pieces * _BLOCKS)
+    r, _, q, _ = found.shape
+    return jnp.sum(found.reshape(r * pieces, _BLOCKS, q, q), axis=1), spread
+
+
+def evidence_of(view: View) -> float:
+    """Log evidence of a view's own model, each free number's prior worth one sample."""
+    products = Evidence.of(view, force_columns(view, []), [view.disturbance]).products[0]
+    return products.log_evidence([]) - 0.5 * (products.known - 1) * float(np.log(products.samples))

@@ -10,7 +10,7 @@ from ..effects import KNOTS, SmoothForce, variables, with_numbers
 from ..likelihood import Disturbance
 from .columns import force_columns
 from .evidence import Evidence
-from .name import SIGNIFICANCE
+from .selector import SIGNIFICANCE
 from .view import View
 
 # places of the body, with which no force that is worth a description grows

@@ -16,8 +16,8 @@ from ..recording import Recording
 from .columns import difference, force_columns, output_columns
 from .diagnosis import ForceTrace, Location
 from .evidence import Evidence
-from .name import Scan
 from .process_noise import NoiseSignal
+from .selector import Scan
 from .view import View, products
 
 _SIGNIFICANT = 2.5

@@ -12,46 +12,35 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
-from .columns import plausible
+from ..effects import AbstractEffect, numbers
 from .diagnosis import Candidate
-from .evidence import SLOTS, Evidence, Products
+from .evidence import Products
 from .progress import Progress
+from .selector import SIGNIFICANCE, Scan, Selector
 
-SIGNIFICANCE = 0.01
 MOST_EFFECTS = 4
-_ABSORBED = 1e-4
 _POSSIBLE = 0.02
-# χ² from which a candidate may come to be chosen
-_LOOKED_AT = 10.0
 # disturbances estimated for rivals of one step
 _TRIES = 3
+# how far off a candidate's χ² may be, over the root of what coefficients leave of it, and at most; twins refitted
+_OFF, _FAR_OFF, _TWINS = 0.03, 0.3, 2
 
 
 @dataclasses.dataclass(frozen=True)
 class Named:
-    """An effect chosen: with its predicted numbers, the probability of its name, and the rivals with theirs."""
-
-    effect: AbstractEffect
-    probability: float
-    rivals: list[tuple[AbstractEffect, float]]
-
-
-@dataclasses.dataclass(frozen=True)
-class Scan:
-    """Every candidate on top of some chosen ones.
+    """An effect chosen.
 
     **Fields**
 
-    - `value`: (m,) log evidence at the disturbance that suits each best; minus infinity where physics forbids it.
-    - `statistic`: (m,) χ² over the chosen ones alone. `effects`: with predicted numbers. `right`: (m,) of admissible
-      sign.
+    - `number`: of the candidate; `effect`: with its predicted numbers; `probability`: of its name.
+    - `rivals`: with their probabilities. `twins`: rivals by number that a linear picture cannot tell from it.
     """
 
-    value: np.ndarray
-    statistic: np.ndarray
-    effects: list[AbstractEffect]
-    right: np.ndarray
+    number: int
+    effect: AbstractEffect
+    probability: float
+    rivals: list[tuple[AbstractEffect, float]]
+    twins: list[tuple[int, AbstractEffect]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,97 +49,30 @@ class Naming:
 
     **Fields**
 
+    - `chosen`: as numbers of candidates; `named`: the same with probabilities.
     - `products`: at the disturbance that is left. `columns`: of what was chosen. `value`: its log evidence.
+    - `again`: whether a free run asked for the last, so that one should look again with it in the model.
     - `first`: the scan before any choice; `candidates`: its lines for the report.
     - `first_p`: p-value of the first choice.
     """
 
+    chosen: list[int]
     named: list[Named]
     products: Products
     columns: list[int]
     value: float
+    again: bool
     first: Scan
     candidates: list[Candidate]
     first_p: float
-
-
-class Selector:
-    """The evidence of sets of candidates, and the disturbances estimated for some of them."""
-
-    def __init__(self, evidence: Evidence, candidates: Sequence[AbstractEffect], owners: Sequence[Sequence[int]]):
-        self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
-        self.kept = evidence.products[0].kept(self.owners)
-        self.usable = np.isfinite(self.kept) & (self.kept > _ABSORBED)
-        self.estimated: set[tuple[int, ...]] = set()
-
-    def columns(self, chosen: Sequence[int]) -> list[int]:
-        """The columns of candidates."""
-        return [column for i in chosen for column in self.owners[i]]
-
-    def value(self, chosen: Sequence[int]) -> float:
-        """Log evidence at the best disturbance."""
-        return self.evidence.best(self.columns(chosen))[0]
-
-    def estimate(self, chosen: Sequence[int]) -> None:
-        """Find the disturbance that is left with `chosen` in the model."""
-        key = tuple(sorted(chosen))
-        if key not in self.estimated:
-            self.estimated.add(key)
-            own = self.columns(chosen)
-            self.evidence.products.append(self.evidence.estimate(own, self.evidence.best(own)[1].disturbance))
-
-    def scan(self, chosen: Sequence[int]) -> Scan:
-        """Every candidate on top of `chosen`."""
-        own = self.columns(chosen)
-        base = self.value(chosen)
-        best, statistic = np.full(len(self.candidates), -np.inf), np.zeros(len(self.candidates))
-        sizes: list[np.ndarray] = [np.zeros(len(columns)) for columns in self.owners]
-        for products in self.evidence.products:
-            gains, at = products.gains(own, self.owners), products.log_evidence(own)
-            values = at + gains.evidence
-            for i in np.flatnonzero(values > best):
-                # twice the gain in likelihood, the disturbances of both their own
-                best[i], sizes[i] = values[i], gains.amplitudes[i]
-                statistic[i] = max(0.0, gains.statistic[i] + 2.0 * (at - base))
-        taken = {self.candidates[i].label for i in chosen}
-        effects, right = [], []
-        for i, effect in enumerate(self.candidates):
-            predicted, good = predict(effect, sizes[i] / self.evidence.length[self.owners[i]])
-            effects.append(predicted)
-            good = good and bool(self.usable[i]) and effect.label not in taken
-            # worth a look only where it may be chosen
-            right.append(good and (statistic[i] < _LOOKED_AT or plausible(self.evidence.view.path, predicted)))
-        fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
-        return Scan(np.where(fine, best, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
-
-    def predicts(self, chosen: Sequence[int], more: int) -> bool:
-        """Whether `more` helps to predict parts of the recordings from the others."""
-        before, after = self.columns(chosen), self.columns([*chosen, more])
-        with_it = self.evidence.best(after)[1].predicted(after)
-        return with_it > self.evidence.best(before)[1].predicted(before)
-
-    def p_value(self, statistic: float, columns: int) -> float:
-        """Of χ² with so many columns, corrected for all candidates tried."""
-        tried = len({(c.label, *c.symbols()) for c in self.candidates})
-        return min(1.0, tried * float(special.chdtrc(columns, statistic)))
-
-
-def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:
-    """An effect with predicted numbers, and whether physics admits them."""
-    names = amplitudes(effect)
-    if names:
-        values = dict(zip(names, amplitude.tolist(), strict=True))
-        found = with_numbers(effect, values)
-        return found, admissible(effect, {**numbers(effect), **values})
-    # a lag that wants to be of the other sign shows as a negative share of its own grid value
-    return effect, bool(amplitude[0] > 0.0)
 
 
 def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan], list[float]]:
     """Candidates chosen one after the other; the scans before each choice and at the end; the p-values of each best.
 
     One that does not help to predict a part of the recordings from the others is passed over: a model that is wrong in
-    other ways finds in any flexible enough effect something to fit, but not the same thing everywhere.
+    other ways finds in any flexible enough effect something to fit, but not the same thing everywhere. One that a free
+    run asks for ends the search: what a model that errs so much says of smaller things is not to be trusted.
     """
     chosen: list[int] = []
     scans, p_values = [], []
@@ -158,7 +80,7 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
         progress(f"weighing the vocabulary ({len(chosen)} effects so far)")
         scan = _settled(selector, chosen)
         scans.append(scan)
-        best = int(np.argmax(scan.value))
+        best = selector.foremost(chosen, scan)
         gain = scan.value[best] - selector.value(chosen)
         p_values.append(
             selector.p_value(float(scan.statistic[best]), len(selector.owners[best])) if np.isfinite(gain) else 1.0
@@ -170,6 +92,8 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
             scans.pop()
             p_values.pop()
             continue
+        if best in selector.freely:
+            return [*chosen, best], scans, p_values
         chosen = _without_idle(selector, [*chosen, best])
 
 
@@ -202,19 +126,25 @@ def name(selector: Selector, progress: Progress) -> Naming:
     """The effects that the recordings ask for, with probabilities."""
     chosen, scans, p_values = select(selector, progress)
     value, products = selector.evidence.best(selector.columns(chosen))
-    named = [_named(selector, chosen, i) for i in chosen]
+    named = standing(selector, chosen)
     lines = table(selector, scans[0])
-    return Naming(named, products, selector.columns(chosen), value, scans[0], lines, p_values[0])
+    again = any(i in selector.freely for i in chosen)
+    return Naming(chosen, named, products, selector.columns(chosen), value, again, scans[0], lines, p_values[0])
 
 
-def _named(selector: Selector, chosen: list[int], index: int) -> Named:
-    """The probability of what stands in one place of the chosen set, and of what might stand there."""
-    others = [i for i in chosen if i != index]
+def standing(selector: Selector, chosen: Sequence[int]) -> list[Named]:
+    """Each of some candidates with its probability and rivals, the others of them in the model."""
+    return [named_on(selector, [i for i in chosen if i != index], index) for index in chosen]
+
+
+def named_on(selector: Selector, others: Sequence[int], index: int) -> Named:
+    """The probability of a candidate on top of `others`, and of what might stand in its place."""
     scan = selector.scan(others)
     forms: dict[str, int] = {}
     for effect in selector.candidates:
         forms[effect.name] = forms.get(effect.name, 0) + 1
     log = scan.value - np.log([forms[effect.name] for effect in selector.candidates])
+    log = np.where(selector.stand_in(others, index), log, -np.inf)
     weights = np.exp(log - np.max(log))
     weights /= np.sum(weights)
     by_name: dict[str, float] = {}
@@ -225,8 +155,27 @@ def _named(selector: Selector, chosen: list[int], index: int) -> Named:
             best[effect.name] = i
     own = selector.candidates[index].name
     rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > _POSSIBLE]
-    effect = scan.effects[index]
-    return Named(effect, by_name[own], sorted(rivals, key=lambda rival: -rival[1]))
+    # what coefficients absorb of an effect, they absorb of the picture's errors too, but not as exactly
+    off = min(_FAR_OFF, _OFF / np.sqrt(max(selector.kept[index], 1e-12)))
+    near = [j for n, j in best.items() if n != own and np.isfinite(log[j])]
+    near = [j for j in near if scan.statistic[j] > (1.0 - off) * scan.statistic[index]]
+    twins = [(j, scan.effects[j]) for j in sorted(near, key=lambda j: -log[j])[:_TWINS]]
+    return Named(index, scan.effects[index], by_name[own], sorted(rivals, key=lambda rival: -rival[1]), twins)
+
+
+def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Named:
+    """A chosen effect with the probabilities of it and its twins by the log evidence of fits, others' as they were."""
+    own = [v for effect, v in values if effect.name == named.effect.name]
+    if not own:
+        return named
+    weights = special.softmax([v for _, v in values])
+    names = {effect.name for effect, _ in values}
+    share = named.probability + sum(p for rival, p in named.rivals if rival.name in names)
+    found = [(effect, share * float(w)) for (effect, _), w in zip(values, weights, strict=True)]
+    others = [pair for pair in named.rivals if pair[0].name not in names]
+    others += [pair for pair in found if pair[0].name != named.effect.name and pair[1] > _POSSIBLE]
+    probability = next(p for effect, p in found if effect.name == named.effect.name)
+    return dataclasses.replace(named, probability=probability, rivals=sorted(others, key=lambda pair: -pair[1]))
 
 
 def table(selector: Selector, scan: Scan) -> list[Candidate]:

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ..effects import CHANNEL_UNITS
 from ..estimate import Fit, channel_rms, initial_guess, output_errors, predict, search
-from ..likelihood import Disturbance, follow, whitened
+from ..likelihood import Disturbance, Followed, follow, whitened
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
@@ -52,18 +52,16 @@ def hold(
         predicted += list(np.asarray(predict(vehicle, taken, start))[: len(batch)])
         errors += list(np.asarray(output_errors(vehicle, taken, start))[: len(batch)])
         spread = initial_guess(vehicle, taken)[1]
-        expected += list(np.asarray(_expected(vehicle, taken, sigma, disturbance, start, spread))[: len(batch)])
+        followed = follow(vehicle, taken, sigma, disturbance, start, spread)
+        expected += list(np.asarray(_probable(disturbance, followed))[: len(batch)])
     whitened_error = np.stack(errors) / np.asarray(sigma)
     rms = channel_rms(jnp.asarray(whitened_error), runs.take(list(chosen), len(chosen)), vehicle.layout.channels)
     return HeldOut(predicted, errors, rms, expected, float(np.sum(whitened_error**2)))
 
 
 @eqx.filter_jit
-def _expected(
-    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, spread: Array
-) -> Float[Array, "r k"]:
+def _probable(disturbance: Disturbance, followed: Followed) -> Float[Array, "r k"]:
     """How probable each sample is given those before it, as a logarithm."""
-    followed = follow(vehicle, runs, sigma, disturbance, start, spread)
     white, factor = whitened(disturbance, followed.system, followed.residual)
     logarithm = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)), axis=-1)
     return -logarithm - 0.5 * jnp.sum(white[..., 0] ** 2, axis=-1)

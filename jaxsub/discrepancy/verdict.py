@@ -27,6 +27,16 @@ class Judged:
     refused: tuple[AbstractEffect, ...] = ()
 
 
+NOTHING = Judged("none", [], 1.0, [])
+
+
+def both(earlier: Judged, later: Judged) -> Judged:
+    """What is to be said once a model with what stands of `earlier` was looked at again."""
+    named, notes = [*earlier.named, *later.named], [*earlier.notes, *later.notes]
+    verdict = _certainty(named) if named else later.verdict
+    return Judged(verdict, named, min(earlier.p_value, later.p_value), notes, (*earlier.refused, *later.refused))
+
+
 def judge(naming: Naming, pattern: Pattern | None) -> Judged:
     """The verdict before anything was tried on the held-out runs."""
     follows = pattern is not None and pattern.significant
@@ -59,13 +69,12 @@ def helped(judged: Judged, effect: AbstractEffect, sound: bool, gain: Luck) -> J
     return dataclasses.replace(judged, notes=[*judged.notes, said], refused=(*judged.refused, effect))
 
 
-def settled(judged: Judged) -> Judged:
+def settled(judged: Judged, stand: list[Named]) -> Judged:
     """The verdict once everything was tried: named by what stands.
 
     Where nothing does, a mismatch that is beyond doubt is unknown, and any other was luck.
     """
-    stand = [named for named in judged.named if named.effect not in judged.refused]
-    if not judged.named or stand == judged.named:
+    if not judged.named:
         return judged
     if not stand:
         return dataclasses.replace(judged, verdict="unknown" if judged.p_value < _BEYOND_DOUBT else "none", named=[])

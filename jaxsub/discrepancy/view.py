@@ -10,14 +10,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..effects import Facts, Motion
-from ..estimate import Fit, Problem, estimate_disturbance
-from ..likelihood import Columns, Disturbance, Followed, System, first_guess, follow, whitened
+from ..estimate import FROM_AFAR, FROM_NEAR, Fit, Problem, estimate_disturbance
+from ..likelihood import Columns, Disturbance, Followed, System, block_products, first_guess, follow, whitened
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .whiteness import record_sigma
 
-# rounds of following and estimating the disturbance: the path hardly depends on it; steps where it is known
-_ROUNDS, _STEPS = 2, 4
+# scoring steps where the disturbance is known
+_STEPS = 4
 _LEAST_WHITE = 1e-5
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
@@ -95,14 +95,14 @@ def look(fit: Fit, disturbance: Disturbance | None = None) -> View:
     if disturbance is None:
         system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
         disturbance = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
-        for _ in range(_ROUNDS):
+        for steps in (FROM_AFAR, FROM_NEAR):
             at = led.at(vehicle, disturbance)
-            disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance)
+            disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance, steps)
             vehicle = led.descend(vehicle, disturbance, 1)
     else:
         vehicle = led.descend(vehicle, disturbance, _STEPS)
         at = led.at(vehicle, disturbance)
-        disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance)
+        disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance, FROM_NEAR)
         vehicle = led.descend(vehicle, disturbance, 1)
     at = led.at(vehicle, disturbance)
     path = Trajectory.of(vehicle, fit.runs, at.followed.expected, at.followed.filtered)
@@ -177,20 +177,7 @@ def products(
     """Products of all columns whitened, the `prior` of the first b included; half the residuals' log-determinant."""
     parts, spread = block_products(disturbance, system, columns, 1)
     b = len(prior)
-    return jnp.sum(parts, axis=0).at[:b, :b].add(prior), spread
-
-
-@eqx.filter_jit
-def block_products(
-    disturbance: Disturbance, system: System, columns: Columns, pieces: int
-) -> tuple[Float[Array, "m q q"], Float[Array, ""]]:
-    """Products of all columns whitened, in each of `pieces` parts of every run; half the log-determinant of all."""
-    white, factor = whitened(disturbance, system, columns)
-    r, k, c, q = white.shape
-    length = -(-k // pieces)
-    padded = jnp.pad(white, [(0, 0), (0, pieces * length - k), (0, 0), (0, 0)])
-    flat = padded.reshape(r * pieces, length * c, q)
-    return jnp.swapaxes(flat, 1, 2) @ flat, jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)))
+    return jnp.sum(parts, axis=(0, 1)).at[:b, :b].add(prior), spread
 
 
 @eqx.filter_jit

@@ -1,7 +1,7 @@
 """Estimation: one `fit`, one `Fit`, and the methods that may do it."""
 
 from .combined import Chain, Global
-from .disturbance import estimate_disturbance
+from .disturbance import FROM_AFAR, FROM_NEAR, estimate_disturbance
 from .filtered import Filtered
 from .fit import Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
 from .method import AbstractMethod, Found, Iterative
@@ -10,6 +10,8 @@ from .problem import Expansion, Problem, initial_guess
 from .starts import Basin, Rate, basins, scattered, success
 
 __all__ = [
+    "FROM_AFAR",
+    "FROM_NEAR",
     "METHODS",
     "AbstractMethod",
     "Basin",

@@ -7,8 +7,8 @@ from jaxtyping import Array, Float
 
 from ..likelihood import Columns, Disturbance, System, restricted
 
-# a step more would gain less than the likelihood is read to
-_MAX_STEPS = 25
+# from nothing known, and from a disturbance that is near: a step more would gain less than the likelihood is read to
+FROM_AFAR, FROM_NEAR = 25, 10
 # standard deviations of weak priors on the logarithms of q, τ and κ: without them an absent force has no optimum
 _LOOSE = (5.0, 1.5, 2.0)
 # as well as some minutes of a force tell log q and log τ; the search is in such units
@@ -17,9 +17,9 @@ _TOLD = (0.1, 0.2)
 
 @eqx.filter_jit
 def estimate_disturbance(
-    system: System, columns: Columns, prior: Float[Array, "p1 p1"], start: Disturbance
+    system: System, columns: Columns, prior: Float[Array, "p1 p1"], start: Disturbance, steps: int
 ) -> Disturbance:
-    """The disturbance of largest restricted likelihood, to a part of a natural unit; the search begins at `start`.
+    """The disturbance of largest restricted likelihood, to a part of a natural unit, within so many `steps` of `start`.
 
     The first of the `columns` is the residual; `prior` as for `restricted`.
     """
@@ -35,4 +35,4 @@ def estimate_disturbance(
         return restricted(parts(y), *given) + 0.5 * jnp.sum((unit * y / loose) ** 2)
 
     solver, given = optx.BFGS(rtol=1e-4, atol=0.1), (system, columns, prior)
-    return parts(optx.minimise(cost, solver, jnp.zeros(2 * n + c), given, max_steps=_MAX_STEPS, throw=False).value)
+    return parts(optx.minimise(cost, solver, jnp.zeros(2 * n + c), given, max_steps=steps, throw=False).value)

@@ -1,6 +1,17 @@
 """Likelihoods: how probable a recording is under a model, and how that changes with everything in it."""
 
-from .disturbance import Columns, Disturbance, System, carried, first_guess, fitted, restricted, smoothed, whitened
+from .disturbance import (
+    Columns,
+    Disturbance,
+    System,
+    block_products,
+    carried,
+    first_guess,
+    fitted,
+    restricted,
+    smoothed,
+    whitened,
+)
 from .innovations import Followed, follow
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
 from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise, propagate
@@ -12,6 +23,7 @@ __all__ = [
     "Jacobians",
     "Linearised",
     "System",
+    "block_products",
     "carried",
     "concentrated_sigma",
     "errors",

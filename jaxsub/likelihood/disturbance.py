@@ -19,6 +19,7 @@ from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
 from ..recording.runs import Runs
+from .innovation_products import Steps, innovation_products, passes, products_by_block
 from .sensitivity import Jacobians, Linearised, propagate
 
 
@@ -118,38 +119,33 @@ def fitted(
 
 def _gram(disturbance: Disturbance, system: System, columns: Columns, prior: Array) -> tuple[Array, Array]:
     """Products of the whitened columns, the priors' included, and half the residuals' log-determinant."""
-    white, factor = whitened(disturbance, system, columns)
-    spread = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)))
-    return jnp.einsum("rkca,rkcb->ab", white, white) + prior, spread
+    gram, spread = innovation_products(*steps(disturbance, system, columns))
+    return gram + prior, spread
 
 
 def whitened(
     disturbance: Disturbance, system: System, columns: Columns
 ) -> tuple[Float[Array, "r k c q"], Float[Array, "r k c c"]]:
     """The innovations of every column, whitened, and the lower Cholesky factors of their covariance."""
+    return passes(*steps(disturbance, system, columns), lambda passed: (passed.white, passed.factor))
+
+
+def block_products(
+    disturbance: Disturbance, system: System, columns: Columns, blocks: int
+) -> tuple[Float[Array, "r b q q"], Float[Array, ""]]:
+    """Products of all columns whitened, in each of `blocks` parts of every run; half the log-determinant of all."""
+    return products_by_block(*steps(disturbance, system, columns), blocks)
+
+
+def steps(disturbance: Disturbance, system: System, columns: Columns) -> tuple[Steps, Float[Array, "z z"]]:
+    """What a filter of the disturbed system needs at each sample, and the covariance of [x, d] that it begins with."""
     F, B = transition(disturbance, system)
-    s, n = system.C.shape[-1], len(disturbance.force)
-    noise = jnp.where(system.measured, disturbance.noise, 1.0) ** 2
-
-    def step(carry: tuple[Array, Array], sample: tuple) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        P, X = carry
-        F, B, C, noise, shown, forcing = sample
-        across = C @ P[:s]
-        factor = jnp.linalg.cholesky(across[:, :s] @ C.T + jnp.diag(noise))
-        white = solve_triangular(factor, jnp.concatenate([shown - C @ X[:s], across], axis=1), lower=True)
-        error, gain = white[:, : shown.shape[1]], white[:, shown.shape[1] :]
-        P, X = F @ (P - gain.T @ gain) @ F.T + B @ B.T, F @ (X + gain.T @ error)
-        X = X if forcing is None else X.at[:s].add(-forcing)
-        return (P, X), (error, factor)
-
-    def run(*samples: Array | None) -> tuple[Array, Array]:
-        begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
-        carry = (begin, jnp.zeros((s + n, columns.shown.shape[-1])))
-        return jax.lax.scan(step, carry, samples)[1]
-
+    # a step after the last sample, so that one loop serves all; it leads nowhere
     last = lambda M: jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
+    noise = jnp.where(system.measured, disturbance.noise, 1.0) ** 2
     forcing = None if columns.forcing is None else last(columns.forcing)
-    return jax.vmap(run)(last(F), last(B), system.C, noise, columns.shown, forcing)
+    begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
+    return Steps(last(F), last(B), system.C, noise, columns.shown, forcing), begin
 
 
 def transition(disturbance: Disturbance, system: System) -> tuple[Float[Array, "r k1 z z"], Float[Array, "r k1 z n"]]:

@@ -11,7 +11,8 @@ from scipy import stats
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.columns import candidate_columns
 from jaxsub.discrepancy.evidence import Evidence, Products
-from jaxsub.discrepancy.name import Selector, select
+from jaxsub.discrepancy.name import select
+from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.view import facts, look
 from jaxsub.effects import candidates
 from jaxsub.effects.hull import CrossflowDrag

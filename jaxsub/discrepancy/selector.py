@@ -1,0 +1,147 @@
+"""What every candidate effect would add to those already chosen, and which of them to take next."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from scipy import special
+
+from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
+from ..likelihood import Disturbance
+from .columns import plausible
+from .evidence import SLOTS, Evidence
+
+SIGNIFICANCE = 0.01
+_ABSORBED = 1e-4
+# χ² from which a candidate may come to be chosen
+_LOOKED_AT = 10.0
+# shares of a free run's errors: a leader that explains so little gives way to one that explains so much
+_LITTLE, _MUCH = 0.02, 0.5
+# times the errors that a candidate leaves: what may stand in its place leaves no more
+_NO_MORE = 2.0
+_STILL = 1e-6
+
+
+@dataclasses.dataclass(frozen=True)
+class Scan:
+    """Every candidate on top of some chosen ones.
+
+    **Fields**
+
+    - `value`: (m,) log evidence at the disturbance that suits each best; minus infinity where physics forbids it.
+    - `statistic`: (m,) χ² over the chosen ones alone. `effects`: with predicted numbers. `right`: (m,) of admissible
+      sign.
+    """
+
+    value: np.ndarray
+    statistic: np.ndarray
+    effects: list[AbstractEffect]
+    right: np.ndarray
+
+
+class Selector:
+    """The evidence of sets of candidates, and the disturbances estimated for some of them."""
+
+    def __init__(self, evidence: Evidence, candidates: Sequence[AbstractEffect], owners: Sequence[Sequence[int]]):
+        self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
+        self.kept = evidence.products[0].kept(self.owners)
+        self.usable = np.isfinite(self.kept) & (self.kept > _ABSORBED)
+        self.estimated: set[tuple[int, ...]] = set()
+        own = evidence.view.disturbance
+        # a free run has no disturbance to put errors down to
+        still = Disturbance(_STILL * own.force, own.time, jnp.ones_like(own.noise))
+        self.free = evidence.under(still)
+        self.freely: set[int] = set()
+        # forms of one effect are one trial
+        self.tried = len({(effect.label, *effect.symbols()) for effect in self.candidates})
+
+    def columns(self, chosen: Sequence[int]) -> list[int]:
+        """The columns of candidates."""
+        return [column for i in chosen for column in self.owners[i]]
+
+    def value(self, chosen: Sequence[int]) -> float:
+        """Log evidence at the best disturbance."""
+        return self.evidence.best(self.columns(chosen))[0]
+
+    def estimate(self, chosen: Sequence[int]) -> None:
+        """Find the disturbance that is left with `chosen` in the model."""
+        key = tuple(sorted(chosen))
+        if key not in self.estimated:
+            self.estimated.add(key)
+            own = self.columns(chosen)
+            self.evidence.products.append(self.evidence.estimate(own, self.evidence.best(own)[1].disturbance))
+
+    def scan(self, chosen: Sequence[int]) -> Scan:
+        """Every candidate on top of `chosen`."""
+        own = self.columns(chosen)
+        base = self.value(chosen)
+        best, statistic = np.full(len(self.candidates), -np.inf), np.zeros(len(self.candidates))
+        sizes: list[np.ndarray] = [np.zeros(len(columns)) for columns in self.owners]
+        for products in self.evidence.products:
+            gains, at = products.gains(own, self.owners), products.log_evidence(own)
+            values = at + gains.evidence
+            for i in np.flatnonzero(values > best):
+                # twice the gain in likelihood, the disturbances of both their own
+                best[i], sizes[i] = values[i], gains.amplitudes[i]
+                statistic[i] = max(0.0, gains.statistic[i] + 2.0 * (at - base))
+        taken = {self.candidates[i].label for i in chosen}
+        effects, right = [], []
+        for i, effect in enumerate(self.candidates):
+            predicted, good = predict(effect, sizes[i] / self.evidence.length[self.owners[i]])
+            effects.append(predicted)
+            good = good and bool(self.usable[i]) and effect.label not in taken
+            # worth a look only where it may be chosen
+            right.append(good and (statistic[i] < _LOOKED_AT or plausible(self.evidence.view.path, predicted)))
+        fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
+        return Scan(np.where(fine, best, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
+
+    def foremost(self, chosen: Sequence[int], scan: Scan) -> int:
+        """Which candidate to take next: the most probable, unless a free run asks for another and hardly for it.
+
+        What happens within a few samples is told by very many of them, and may be of no importance later.
+        """
+        best = int(np.argmax(scan.value))
+        share = self.free.explained(self.columns(chosen), self.owners)
+        if share[best] > _LITTLE:
+            return best
+        p_values = [self.p_value(x, len(own)) for x, own in zip(scan.statistic, self.owners, strict=True)]
+        asked = (scan.value > self.value(chosen)) & (np.array(p_values) < SIGNIFICANCE) & (share > _MUCH)
+        if not np.any(asked):
+            return best
+        best = int(np.argmax(np.where(asked, share, -np.inf)))
+        self.freely.add(best)
+        return best
+
+    def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
+        """(m,) whether each candidate may stand where `index` does, on top of `chosen`.
+
+        Where a free run asked for it, those that leave much more of the free run's errors may not.
+        """
+        if index not in self.freely:
+            return np.ones(len(self.candidates), bool)
+        left = 1.0 - self.free.explained(self.columns(chosen), self.owners)
+        return left <= _NO_MORE * left[index]
+
+    def predicts(self, chosen: Sequence[int], more: int) -> bool:
+        """Whether `more` helps to predict parts of the recordings, or of a free run that asked, from the others."""
+        before, after = self.columns(chosen), self.columns([*chosen, more])
+        if more in self.freely:
+            return self.free.predicted(after) > self.free.predicted(before)
+        with_it = self.evidence.best(after)[1].predicted(after)
+        return with_it > self.evidence.best(before)[1].predicted(before)
+
+    def p_value(self, statistic: float, columns: int) -> float:
+        """Of χ² with so many columns, corrected for all candidates tried."""
+        return min(1.0, self.tried * float(special.chdtrc(columns, statistic)))
+
+
+def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:
+    """An effect with predicted numbers, and whether physics admits them."""
+    names = amplitudes(effect)
+    if names:
+        values = dict(zip(names, amplitude.tolist(), strict=True))
+        found = with_numbers(effect, values)
+        return found, admissible(effect, {**numbers(effect), **values})
+    # a lag that wants to be of the other sign shows as a negative share of its own grid value
+    return effect, bool(amplitude[0] > 0.0)
