@@ -17,7 +17,7 @@ from .model import join, sound
 from .name import Naming, named_on, refitted, standing
 from .progress import Progress
 from .selector import Selector
-from .show import HeldOut, hold, luck
+from .show import HeldOut, Luck, hold, luck
 from .verdict import Judged, helped, settled
 from .view import View, look
 
@@ -63,28 +63,69 @@ class Trial:
         return hold(fit.vehicle, self.runs, self.chosen, self.size, self.sigma, disturbance)
 
 
+class Tries:
+    """Models with some of the candidates of one look at the recordings, by number, each fitted once."""
+
+    def __init__(self, trial: Trial, base: Model, found: Found):
+        self.trial, self.found = trial, found
+        self.models: dict[tuple[int, ...], Model] = {(): base}
+        self.said: dict[int, tuple[bool, Luck]] = {}
+
+    def effects(self, numbers: Sequence[int]) -> list[AbstractEffect]:
+        """With the numbers that are predicted for each beside the others."""
+        return [named_on(self.found.selector, [j for j in numbers if j != i], i).effect for i in numbers]
+
+    def model(self, numbers: Sequence[int]) -> Model:
+        """The base with these."""
+        key, disturbance = tuple(sorted(numbers)), self.found.naming.products.disturbance
+        if key not in self.models:
+            self.models[key] = self.trial.with_effects(self.models[()], self.effects(key), disturbance)
+        return self.models[key]
+
+    def sound(self, numbers: Sequence[int]) -> bool:
+        """Whether they came out of the fit as physics admits."""
+        return sound(self.model(numbers).fit, self.model(numbers).added)
+
+    def helps(self, fewer: Sequence[int], more: int) -> bool:
+        """Whether one more on top of `fewer` stands on the held-out runs; what was found is kept in `said`."""
+        whole = [*fewer, more]
+        self.said[more] = self.sound(whole), luck(self.model(fewer).shown, self.model(whole).shown)
+        return self.said[more][0] and self.said[more][1].helps
+
+    def closest(self, chosen: Sequence[int], index: int) -> list[tuple[int, float]]:
+        """A chosen candidate and its twins with the log evidence of their fits, the others chosen beside them."""
+        others = [i for i in chosen if i != index]
+        twins = [number for number, _ in named_on(self.found.selector, others, index).twins if number not in others]
+        value = lambda i: evidence_of(self.model([*others, i]).view) if self.sound([*others, i]) else -np.inf
+        return [(i, value(i)) for i in (index, *twins)] if twins else [(index, 0.0)]
+
+
 def tried(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
     """The model with those of the effects `judged` that stand on the held-out runs, and what is then to be said.
 
-    One after the other, since what fails on runs that were not fitted must not take with it what stands; each beside
-    its twins, of which the most probable after a fit is taken.
+    First each is told from its twins by their fits. Then all are tried together, and each is left out in turn: with
+    one of two alone the coefficients take up the other. Where all together do not stand, one is added after the other.
     """
-    best, stand, fits = base, [], {}
-    disturbance = found.naming.products.disturbance
-    for chosen in found.naming.chosen:
-        if chosen in stand:
-            continue
-        taken, named = best.added[len(base.added) :], named_on(found.selector, stand, chosen)
-        options = [(chosen, named.effect), *named.twins]
-        models = [trial.with_effects(base, [*taken, effect], disturbance) for _, effect in options]
-        values = [evidence_of(more.view) if sound(more.fit, more.added) else -np.inf for more in models]
-        (number, effect), more = options[int(np.argmax(values))], models[int(np.argmax(values))]
-        judged = helped(judged, effect, sound(more.fit, more.added), luck(best.shown, more.shown))
-        if effect not in judged.refused:
-            best, stand = more, [*stand, number]
-            fits[effect.name] = [(option, value) for (_, option), value in zip(options, values, strict=True)]
+    tries, chosen, fits = Tries(trial, base, found), list(found.naming.chosen), {}
+    for place, index in enumerate(chosen):
+        values = tries.closest(chosen, index)
+        chosen[place] = max(values, key=lambda pair: pair[1])[0]
+        fits[chosen[place]] = [(found.selector.candidates[i], value) for i, value in values]
+    kept: list[int] = []
+    if len(chosen) > 1 and tries.sound(chosen) and luck(base.shown, tries.model(chosen).shown).helps:
+        kept = list(chosen)
+        for index in reversed(chosen):
+            rest = [i for i in kept if i != index]
+            if not tries.helps(rest, index):
+                kept = rest
+    else:
+        for index in chosen:
+            kept = [*kept, index] if tries.helps(kept, index) else kept
+    for index, effect in zip(chosen, tries.effects(chosen), strict=True):
+        judged = helped(judged, effect, *tries.said[index])
     # how probable each is was said before twins were fitted, and with what was refused in the model
-    return best, settled(judged, [refitted(one, fits[one.effect.name]) for one in standing(found.selector, stand)])
+    stand = [refitted(one, fits[one.number]) for one in standing(found.selector, kept)]
+    return tries.model(kept), settled(judged, stand)
 
 
 def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
