@@ -1,7 +1,6 @@
 """What every test starts from: 64-bit numbers, annotated shapes checked at each call, compiled code kept."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import jax
 import jaxtyping
@@ -10,10 +9,6 @@ import pytest
 jax.config.update("jax_enable_x64", True)
 # Before any test imports jaxsub, since only modules imported later are checked.
 jaxtyping.install_import_hook("jaxsub", "typechecking.checked")
-
-_MAPS = Path("/proc/self/maps")
-# a process may have 65 530 memory maps on Linux, compiled programs take a few each, and without one more it dies
-_MANY = 30_000
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -25,6 +20,7 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.fixture(autouse=True)
 def room_for_programs() -> Iterator[None]:
     """Compiled programs are let go of before there are too many."""
+    from jaxsub.discrepancy.programs import make_room
+
     yield
-    if _MAPS.exists() and _MAPS.read_bytes().count(b"\n") > _MANY:
-        jax.clear_caches()
+    make_room()

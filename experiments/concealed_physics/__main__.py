@@ -20,7 +20,7 @@ from .plan import COUNTS, Case, ordered
 from .work import on_own_core, work
 
 # a process may hold so many compiled programs and no more
-_CASES_A_PROCESS = 6
+_CASES_A_PROCESS = 3
 
 
 def main() -> None:

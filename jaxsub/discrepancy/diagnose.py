@@ -21,6 +21,7 @@ from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
 from .name import Named, name
 from .process_noise import noise_note, noise_signals
+from .programs import make_room
 from .progress import Progress
 from .selector import Selector
 from .show import channel_quality, coefficients, estimates, overlays, run_quality
@@ -128,6 +129,7 @@ def _told(
 
 def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
     """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
+    make_room()
     present = {effect.label for effect in view.vehicle.effects}
     listed = [effect for effect in candidates(facts(view), vocabulary) if effect.label not in present]
     columns, owners = candidate_columns(view, listed)

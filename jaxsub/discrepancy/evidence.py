@@ -130,10 +130,9 @@ class Products:
 
 @dataclasses.dataclass(frozen=True)
 class Evidence:
-    """A view, the columns of all candidates in units of their length (`whole`: after the view's own), and products."""
+    """A view, its columns with those of all candidates in units of their length, and their products."""
 
     view: View
-    columns: Columns
     whole: Columns
     length: np.ndarray
     products: list[Products]
@@ -143,7 +142,7 @@ class Evidence:
         """Under the given disturbances, or shares of the view's."""
         length = lengths(view.disturbance, view.followed.system, columns)
         scaled = jax.tree.map(lambda column: column / length, columns)
-        made = cls(view, scaled, view.base + scaled, np.asarray(length), [])
+        made = cls(view, view.base + scaled, np.asarray(length), [])
         own = view.disturbance
         shares = [dataclasses.replace(own, force=share * own.force) for share in _SHARES]
         for disturbance in disturbances or shares:
@@ -174,8 +173,9 @@ class Evidence:
         return self.under(found)
 
     def picked(self, chosen: Sequence[int]) -> Columns:
-        """Some of the columns."""
-        return jax.tree.map(lambda column: column[..., np.array(chosen, int)], self.columns)
+        """Some of the candidates' columns."""
+        at = len(self.view.prior) + np.array(chosen, int)
+        return jax.tree.map(lambda column: column[..., at], self.whole)
 
     def best(self, chosen: Sequence[int]) -> tuple[float, Products]:
         """The largest log evidence of `chosen` over the disturbances, and the products where it is."""

@@ -7,7 +7,7 @@ others chosen held; equal before the data for every name, and within a name for 
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from scipy import special
@@ -132,19 +132,21 @@ def name(selector: Selector, progress: Progress) -> Naming:
     return Naming(chosen, named, products, selector.columns(chosen), value, again, scans[0], lines, p_values[0])
 
 
-def standing(selector: Selector, chosen: Sequence[int]) -> list[Named]:
+def standing(selector: Selector, chosen: Sequence[int], refused: Collection[int] = ()) -> list[Named]:
     """Each of some candidates with its probability and rivals, the others of them in the model."""
-    return [named_on(selector, [i for i in chosen if i != index], index) for index in chosen]
+    return [named_on(selector, [i for i in chosen if i != index], index, refused) for index in chosen]
 
 
-def named_on(selector: Selector, others: Sequence[int], index: int) -> Named:
-    """The probability of a candidate on top of `others`, and of what might stand in its place."""
+def named_on(selector: Selector, others: Sequence[int], index: int, refused: Collection[int] = ()) -> Named:
+    """The probability of a candidate on top of `others`, and of what might stand there and was not `refused`."""
     scan = selector.scan(others)
     forms: dict[str, int] = {}
     for effect in selector.candidates:
         forms[effect.name] = forms.get(effect.name, 0) + 1
     log = scan.value - np.log([forms[effect.name] for effect in selector.candidates])
-    log = np.where(selector.stand_in(others, index), log, -np.inf)
+    out = {selector.candidates[i].name for i in refused} - {selector.candidates[index].name}
+    may = selector.stand_in(others, index) & np.array([effect.name not in out for effect in selector.candidates])
+    log = np.where(may, log, -np.inf)
     weights = np.exp(log - np.max(log))
     weights /= np.sum(weights)
     by_name: dict[str, float] = {}

@@ -15,6 +15,7 @@ from .evidence import evidence_of
 from .generic import Pattern
 from .model import join, sound
 from .name import Naming, named_on, refitted, standing
+from .programs import make_room
 from .progress import Progress
 from .selector import Selector
 from .show import HeldOut, Luck, hold, luck
@@ -53,6 +54,7 @@ class Trial:
 
     def with_effects(self, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance) -> Model:
         """A model with `effects` more, fitted again and tried; a search for its disturbance starts from that given."""
+        make_room()
         self.progress(f"fitting with {', '.join(effect.label for effect in effects)}")
         joined = join(model.view, model.fit, effects)
         view = look(joined, disturbance)
@@ -124,7 +126,8 @@ def tried(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Mode
     for index, effect in zip(chosen, tries.effects(chosen), strict=True):
         judged = helped(judged, effect, *tries.said[index])
     # how probable each is was said before twins were fitted, and with what was refused in the model
-    stand = [refitted(one, fits[one.number]) for one in standing(found.selector, kept)]
+    refused = [index for index in chosen if index not in kept]
+    stand = [refitted(one, fits[one.number]) for one in standing(found.selector, kept, refused)]
     return tries.model(kept), settled(judged, stand)
 
 

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ..effects import Facts, Motion
 from ..estimate import FROM_AFAR, FROM_NEAR, Fit, Problem, estimate_disturbance
-from ..likelihood import Columns, Disturbance, Followed, System, block_products, first_guess, follow, whitened
+from ..likelihood import Columns, Disturbance, Followed, System, block_products, first_guess, follow, whitened_squares
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .whiteness import record_sigma
@@ -183,8 +183,7 @@ def products(
 @eqx.filter_jit
 def lengths(disturbance: Disturbance, system: System, columns: Columns) -> Float[Array, " q"]:
     """The root of each column's whitened squares; one for an empty column."""
-    white, _ = whitened(disturbance, system, columns)
-    squares = jnp.sum(white**2, (0, 1, 2))
+    squares = whitened_squares(disturbance, system, columns)
     return jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
 
 

@@ -11,6 +11,7 @@ from .disturbance import (
     restricted,
     smoothed,
     whitened,
+    whitened_squares,
 )
 from .innovations import Followed, follow
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
@@ -39,4 +40,5 @@ __all__ = [
     "restricted",
     "smoothed",
     "whitened",
+    "whitened_squares",
 ]

@@ -130,6 +130,12 @@ def whitened(
     return passes(*steps(disturbance, system, columns), lambda passed: (passed.white, passed.factor))
 
 
+def whitened_squares(disturbance: Disturbance, system: System, columns: Columns) -> Float[Array, " q"]:
+    """The sum of squares of each column's whitened innovations."""
+    squares = passes(*steps(disturbance, system, columns), lambda passed: jnp.sum(passed.white**2, axis=0))
+    return jnp.sum(squares, axis=(0, 1))
+
+
 def block_products(
     disturbance: Disturbance, system: System, columns: Columns, blocks: int
 ) -> tuple[Float[Array, "r b q q"], Float[Array, ""]]:

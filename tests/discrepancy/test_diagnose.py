@@ -13,6 +13,7 @@ from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.locate import traces
+from jaxsub.discrepancy.next_run import next_run
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import AbstractForce
 from jaxsub.effects.base import amplitude
@@ -79,16 +80,21 @@ def test_nothing_concealed_is_none():
     assert (found.verdict, found.physics, found.where) == ("none", [], [])
     assert found.p_value > 0.01
     assert found.fit["held_out"]["baseline"] == found.fit["held_out"]["improved"]
+    assert next_run(found, recorded(None, 5)[:2]) is None
 
 
 @pytest.mark.long
 def test_near_twins_are_ambiguous_with_their_rivals():
-    found, _ = run(HullAsymmetry("pitch", 0.6))
+    found, _ = run(HullAsymmetry("pitch", 1.5))
     names = {physics.effect for physics in found.physics}
     rivals = {rival.effect for physics in found.physics for rival in physics.rivals}
     assert found.verdict == "ambiguous"
-    assert {"hull-asymmetry", "trim-offset"} <= names | rivals
+    assert "hull-asymmetry" in names | rivals
     assert found.next_manoeuvre
+    planned = next_run(found, recorded(HullAsymmetry("pitch", 1.5), 5)[:2])
+    assert planned is not None
+    assert planned.separation > 2.0 * planned.before
+    assert planned.within <= 1.0 + 1e-9
 
 
 def test_outside_the_vocabulary_is_unknown_and_located():
