@@ -22,6 +22,9 @@ from .show import HeldOut, Luck, hold, luck
 from .verdict import Judged, helped, settled
 from .view import View, look
 
+# candidates by number with the log evidence of a fit
+Fits = list[tuple[int, float]]
+
 
 @dataclasses.dataclass(frozen=True)
 class Found:
@@ -94,41 +97,54 @@ class Tries:
         self.said[more] = self.sound(whole), luck(self.model(fewer).shown, self.model(whole).shown)
         return self.said[more][0] and self.said[more][1].helps
 
-    def closest(self, chosen: Sequence[int], index: int) -> list[tuple[int, float]]:
-        """A chosen candidate and its twins with the log evidence of their fits, the others chosen beside them."""
-        others = [i for i in chosen if i != index]
+    def closest(self, others: Sequence[int], index: int) -> Fits:
+        """A candidate and its twins with the log evidence of their fits, the `others` beside them; the best first."""
         twins = [number for number, _ in named_on(self.found.selector, others, index).twins if number not in others]
+        if not twins:
+            return [(index, 0.0)]
         value = lambda i: evidence_of(self.model([*others, i]).view) if self.sound([*others, i]) else -np.inf
-        return [(i, value(i)) for i in (index, *twins)] if twins else [(index, 0.0)]
+        return sorted([(i, value(i)) for i in (index, *twins)], key=lambda fit: -fit[1])
+
+
+def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
+    """What stands of `chosen` when all are tried at once, each as the best of its twins, and each is left out in turn.
+
+    With one of two alone the coefficients take up the other. Nothing where all together do not stand.
+    """
+    kept: dict[int, Fits] = {}
+    for place, index in enumerate(chosen):
+        fits = tries.closest([*kept, *chosen[place + 1 :]], index)
+        kept[fits[0][0]] = fits
+    if not tries.sound([*kept]) or not luck(tries.model(()).shown, tries.model([*kept]).shown).helps:
+        return {}
+    for index in reversed([*kept]):
+        if not tries.helps([i for i in kept if i != index], index):
+            del kept[index]
+    return kept
+
+
+def in_turn(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
+    """What stands of `chosen` when one is added after the other, each as the best of its twins."""
+    kept: dict[int, Fits] = {}
+    for index in chosen:
+        fits = [(index, 0.0)] if index in kept else tries.closest([*kept], index)
+        if fits[0][0] not in kept and tries.helps([*kept], fits[0][0]):
+            kept[fits[0][0]] = fits
+    return kept
 
 
 def tried(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
-    """The model with those of the effects `judged` that stand on the held-out runs, and what is then to be said.
-
-    First each is told from its twins by their fits. Then all are tried together, and each is left out in turn: with
-    one of two alone the coefficients take up the other. Where all together do not stand, one is added after the other.
-    """
-    tries, chosen, fits = Tries(trial, base, found), list(found.naming.chosen), {}
-    for place, index in enumerate(chosen):
-        values = tries.closest(chosen, index)
-        chosen[place] = max(values, key=lambda pair: pair[1])[0]
-        fits[chosen[place]] = [(found.selector.candidates[i], value) for i, value in values]
-    kept: list[int] = []
-    if len(chosen) > 1 and tries.sound(chosen) and luck(base.shown, tries.model(chosen).shown).helps:
-        kept = list(chosen)
-        for index in reversed(chosen):
-            rest = [i for i in kept if i != index]
-            if not tries.helps(rest, index):
-                kept = rest
-    else:
-        for index in chosen:
-            kept = [*kept, index] if tries.helps(kept, index) else kept
-    for index, effect in zip(chosen, tries.effects(chosen), strict=True):
-        judged = helped(judged, effect, *tries.said[index])
+    """The model with those of the effects `judged` that stand on the held-out runs, and what is then to be said."""
+    tries, chosen = Tries(trial, base, found), found.naming.chosen
+    kept = together(tries, chosen) if len(chosen) > 1 else {}
+    kept = kept or in_turn(tries, chosen)
+    for index, said in tries.said.items():
+        judged = helped(judged, found.selector.candidates[index], *said)
     # how probable each is was said before twins were fitted, and with what was refused in the model
-    refused = [index for index in chosen if index not in kept]
-    stand = [refitted(one, fits[one.number]) for one in standing(found.selector, kept, refused)]
-    return tries.model(kept), settled(judged, stand)
+    named = standing(found.selector, [*kept], [index for index in tries.said if index not in kept])
+    effects = found.selector.candidates
+    stand = [refitted(one, [(effects[i], value) for i, value in kept[one.number]]) for one in named]
+    return tries.model([*kept]), settled(judged, stand)
 
 
 def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
