@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 
 from experiments.concealed_physics.bodies import CRUISE_SHAFT, body, commands, start_state
@@ -31,7 +32,7 @@ class Case:
     def driven(self, recording: Recording, seed: int, noise: bool = True) -> Recording:
         """What the truth records when driven by the inputs of `recording`."""
         start = np.append(self.start, np.zeros(len(self.truth.layout.positions) - len(self.vehicle.layout.positions)))
-        options = {"start": start[None], "states": sampled_states}
+        options = {"start": jnp.asarray(start[None]), "states": sampled_states}
         (answer,) = synthetic(self.truth, [recording], seed=seed, noise=noise, **options)
         return answer
 

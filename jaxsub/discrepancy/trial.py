@@ -133,16 +133,23 @@ def in_turn(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
     return kept
 
 
+def what_stands(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
+    """Of `chosen`, together or else in turn; looked at again where some fell, for twins depend on what is beside."""
+    kept = together(tries, chosen) if len(chosen) > 1 else {}
+    if kept and len(kept) < len(chosen):
+        return what_stands(tries, [*kept])
+    return kept or in_turn(tries, chosen)
+
+
 def tried(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
     """The model with those of the effects `judged` that stand on the held-out runs, and what is then to be said."""
-    tries, chosen = Tries(trial, base, found), found.naming.chosen
-    kept = together(tries, chosen) if len(chosen) > 1 else {}
-    kept = kept or in_turn(tries, chosen)
-    for index, said in tries.said.items():
-        judged = helped(judged, found.selector.candidates[index], *said)
+    tries, effects = Tries(trial, base, found), found.selector.candidates
+    kept = what_stands(tries, found.naming.chosen)
+    refused = [index for index, (fine, gain) in tries.said.items() if index not in kept and not (fine and gain.helps)]
+    for index in [*refused, *kept]:
+        judged = helped(judged, effects[index], *tries.said[index])
     # how probable each is was said before twins were fitted, and with what was refused in the model
-    named = standing(found.selector, [*kept], [index for index in tries.said if index not in kept])
-    effects = found.selector.candidates
+    named = standing(found.selector, [*kept], refused)
     stand = [refitted(one, [(effects[i], value) for i, value in kept[one.number]]) for one in named]
     return tries.model([*kept]), settled(judged, stand)
 
