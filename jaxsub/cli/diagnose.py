@@ -59,7 +59,7 @@ def write_diagnosis(
     """
     with session.progress(f"diagnosing {vehicle.layout.name}") as told:
         diagnosis, improved = diagnose_runs(vehicle, train, held, vocabulary=kinds, progress=told)
-        if manoeuvre:
+        if manoeuvre and diagnosis.explanations:
             told("looking for the manoeuvre that would settle it")
             diagnosis = _with_next_run(diagnosis, train, folder)
         told("writing the report")
@@ -76,8 +76,7 @@ def _with_next_run(diagnosis: Diagnosis, train: Sequence[Recording], folder: Pat
     if found is None:
         return diagnosis
     save(found.recording, folder / _NEXT)
-    text = f"{diagnosis.next_manoeuvre or ''}. {said(found, _NEXT)}"
-    return dataclasses.replace(diagnosis, next_manoeuvre=text.removeprefix(". "))
+    return dataclasses.replace(diagnosis, next_manoeuvre=f"{diagnosis.next_manoeuvre}. {said(found, _NEXT)}")
 
 
 def show(diagnosis: Diagnosis, out: Path) -> None:

@@ -11,14 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import AbstractActuator, AbstractEffect, AbstractSensor, Motion, by_name, velocities
-from ..likelihood import Columns, Disturbance, fitted, smoothed
+from ..likelihood import Columns, Disturbance, fitted, products, smoothed
 from ..recording import Recording
 from .columns import difference, force_columns, output_columns
 from .diagnosis import ForceTrace, Location
 from .evidence import Evidence
 from .process_noise import NoiseSignal
 from .selector import Scan
-from .view import View, products
+from .view import View
 
 _SIGNIFICANT = 2.5
 # of a force where the filter's process noise rises too

@@ -33,30 +33,29 @@ class Named:
     **Fields**
 
     - `number`: of the candidate; `effect`: with its predicted numbers; `probability`: of its name.
-    - `rivals`: with their probabilities. `twins`: rivals by number that a linear picture cannot tell from it.
+    - `rivals`: with their probabilities. `twins`: numbers of rivals that a linear picture cannot tell from it.
     """
 
     number: int
     effect: AbstractEffect
     probability: float
     rivals: list[tuple[AbstractEffect, float]]
-    twins: list[tuple[int, AbstractEffect]]
+    twins: list[int]
 
 
 @dataclasses.dataclass(frozen=True)
 class Naming:
-    """What was chosen, in order, and how.
+    """What was chosen, and how.
 
     **Fields**
 
-    - `chosen`: as numbers of candidates; `named`: the same with probabilities.
+    - `named`: with probabilities, in the order of choice.
     - `products`: at the disturbance that is left. `columns`: of what was chosen. `value`: its log evidence.
     - `again`: whether a free run asked for the last, so that one should look again with it in the model.
     - `first`: the scan before any choice; `candidates`: its lines for the report.
     - `first_p`: p-value of the first choice.
     """
 
-    chosen: list[int]
     named: list[Named]
     products: Products
     columns: list[int]
@@ -129,7 +128,7 @@ def name(selector: Selector, progress: Progress) -> Naming:
     named = standing(selector, chosen)
     lines = table(selector, scans[0])
     again = any(i in selector.freely for i in chosen)
-    return Naming(chosen, named, products, selector.columns(chosen), value, again, scans[0], lines, p_values[0])
+    return Naming(named, products, selector.columns(chosen), value, again, scans[0], lines, p_values[0])
 
 
 def standing(selector: Selector, chosen: Sequence[int], refused: Collection[int] = ()) -> list[Named]:
@@ -161,7 +160,7 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     off = min(_FAR_OFF, _OFF / np.sqrt(max(selector.kept[index], 1e-12)))
     near = [j for n, j in best.items() if n != own and np.isfinite(log[j])]
     near = [j for j in near if scan.statistic[j] > (1.0 - off) * scan.statistic[index]]
-    twins = [(j, scan.effects[j]) for j in sorted(near, key=lambda j: -log[j])[:_TWINS]]
+    twins = sorted(near, key=lambda j: -log[j])[:_TWINS]
     return Named(index, scan.effects[index], by_name[own], sorted(rivals, key=lambda rival: -rival[1]), twins)
 
 

@@ -73,21 +73,22 @@ class Luck(NamedTuple):
     **Fields**
 
     - `likelihood`: in log likelihood, each sample given those before it. `probability`: that this is luck.
-    - `free`: the ratio of a free run's χ², after to before.
+    - `free`: the ratio of a free run's χ², after to before. `sound`: whether physics admits the numbers of the fit.
     """
 
     likelihood: float
     probability: float
     free: float
+    sound: bool
 
     @property
     def helps(self) -> bool:
-        """Whether what comes next is predicted better, not by luck, and a free run not worse."""
-        return self.likelihood > 0.0 and self.probability < _CHANCE and self.free < _WORSE
+        """Whether what comes next is predicted better, soundly and not by luck, and a free run not worse."""
+        return self.sound and self.likelihood > 0.0 and self.probability < _CHANCE and self.free < _WORSE
 
 
-def luck(before: HeldOut, after: HeldOut) -> Luck:
-    """The gain of held-out runs, and whether it is luck.
+def luck(before: HeldOut, after: HeldOut, sound: bool) -> Luck:
+    """The gain of held-out runs by a fit that is `sound` or not, and whether it is luck.
 
     By a bootstrap over blocks of samples (Künsch 1989, Ann. Statist. 17): neighbouring samples' gains go together.
     """
@@ -96,7 +97,7 @@ def luck(before: HeldOut, after: HeldOut) -> Luck:
     rng = np.random.default_rng(0)
     drawn = rng.choice(blocks, (_DRAWS, len(blocks))).sum(axis=1)
     probability = float((1 + np.sum(drawn <= 0.0)) / (1 + _DRAWS))
-    return Luck(float(blocks.sum()), probability, after.chi_square / max(before.chi_square, 1e-300))
+    return Luck(float(blocks.sum()), probability, after.chi_square / max(before.chi_square, 1e-300), sound)
 
 
 def overlays(

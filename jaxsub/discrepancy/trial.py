@@ -74,11 +74,12 @@ class Tries:
     def __init__(self, trial: Trial, base: Model, found: Found):
         self.trial, self.found = trial, found
         self.models: dict[tuple[int, ...], Model] = {(): base}
-        self.said: dict[int, tuple[bool, Luck]] = {}
+        self.said: dict[int, Luck] = {}
 
     def effects(self, numbers: Sequence[int]) -> list[AbstractEffect]:
         """With the numbers that are predicted for each beside the others."""
-        return [named_on(self.found.selector, [j for j in numbers if j != i], i).effect for i in numbers]
+        beside = lambda i: self.found.selector.scan([j for j in numbers if j != i])
+        return [beside(i).effects[i] for i in numbers]
 
     def model(self, numbers: Sequence[int]) -> Model:
         """The base with these."""
@@ -93,13 +94,16 @@ class Tries:
 
     def helps(self, fewer: Sequence[int], more: int) -> bool:
         """Whether one more on top of `fewer` stands on the held-out runs; what was found is kept in `said`."""
-        whole = [*fewer, more]
-        self.said[more] = self.sound(whole), luck(self.model(fewer).shown, self.model(whole).shown)
-        return self.said[more][0] and self.said[more][1].helps
+        self.said[more] = self.gain(fewer, [*fewer, more])
+        return self.said[more].helps
+
+    def gain(self, fewer: Sequence[int], more: Sequence[int]) -> Luck:
+        """What the held-out runs gain from the one set to the other."""
+        return luck(self.model(fewer).shown, self.model(more).shown, self.sound(more))
 
     def closest(self, others: Sequence[int], index: int) -> Fits:
         """A candidate and its twins with the log evidence of their fits, the `others` beside them; the best first."""
-        twins = [number for number, _ in named_on(self.found.selector, others, index).twins if number not in others]
+        twins = [number for number in named_on(self.found.selector, others, index).twins if number not in others]
         if not twins:
             return [(index, 0.0)]
         value = lambda i: evidence_of(self.model([*others, i]).view) if self.sound([*others, i]) else -np.inf
@@ -115,7 +119,7 @@ def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
     for place, index in enumerate(chosen):
         fits = tries.closest([*kept, *chosen[place + 1 :]], index)
         kept[fits[0][0]] = fits
-    if not tries.sound([*kept]) or not luck(tries.model(()).shown, tries.model([*kept]).shown).helps:
+    if not tries.gain([], [*kept]).helps:
         return {}
     for index in reversed([*kept]):
         if not tries.helps([i for i in kept if i != index], index):
@@ -144,10 +148,10 @@ def what_stands(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
 def tried(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
     """The model with those of the effects `judged` that stand on the held-out runs, and what is then to be said."""
     tries, effects = Tries(trial, base, found), found.selector.candidates
-    kept = what_stands(tries, found.naming.chosen)
-    refused = [index for index, (fine, gain) in tries.said.items() if index not in kept and not (fine and gain.helps)]
+    kept = what_stands(tries, [one.number for one in found.naming.named])
+    refused = [index for index, gain in tries.said.items() if index not in kept and not gain.helps]
     for index in [*refused, *kept]:
-        judged = helped(judged, effects[index], *tries.said[index])
+        judged = helped(judged, effects[index], tries.said[index])
     # how probable each is was said before twins were fitted, and with what was refused in the model
     named = standing(found.selector, [*kept], refused)
     stand = [refitted(one, [(effects[i], value) for i, value in kept[one.number]]) for one in named]
@@ -160,5 +164,5 @@ def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Mo
         return base, judged
     force = found.pattern.force
     more = trial.with_effects(base, [force], found.naming.products.disturbance)
-    judged = helped(judged, force, sound(more.fit, more.added), luck(base.shown, more.shown))
-    return (base if force in judged.refused else more), judged
+    gain = luck(base.shown, more.shown, sound(more.fit, more.added))
+    return (more if gain.helps else base), helped(judged, force, gain)

@@ -18,13 +18,12 @@ _BEYOND_DOUBT = 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Judged:
-    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader; effects that were refused."""
+    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader."""
 
     verdict: Verdict
     named: list[Named]
     p_value: float
     notes: list[str]
-    refused: tuple[AbstractEffect, ...] = ()
 
 
 NOTHING = Judged("none", [], 1.0, [])
@@ -34,7 +33,7 @@ def both(earlier: Judged, later: Judged) -> Judged:
     """What is to be said once a model with what stands of `earlier` was looked at again."""
     named, notes = [*earlier.named, *later.named], [*earlier.notes, *later.notes]
     verdict = _certainty(named) if named else later.verdict
-    return Judged(verdict, named, min(earlier.p_value, later.p_value), notes, (*earlier.refused, *later.refused))
+    return Judged(verdict, named, min(earlier.p_value, later.p_value), notes)
 
 
 def judge(naming: Naming, pattern: Pattern | None) -> Judged:
@@ -58,15 +57,15 @@ def judge(naming: Naming, pattern: Pattern | None) -> Judged:
     return Judged(_certainty(naming.named), naming.named, p_value, notes)
 
 
-def helped(judged: Judged, effect: AbstractEffect, sound: bool, gain: Luck) -> Judged:
-    """The verdict once it is known what held-out runs gain by an effect, and whether its numbers are `sound`."""
-    if sound and gain.helps:
+def helped(judged: Judged, effect: AbstractEffect, gain: Luck) -> Judged:
+    """The verdict once it is known what held-out runs gain by an effect."""
+    if gain.helps:
         said = f"With {effect.label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
         said += f"that this is luck has probability {gain.probability:.2g}."
         return dataclasses.replace(judged, notes=[*judged.notes, said])
-    why = "the held-out runs worse" if sound else "with numbers that physics does not admit"
+    why = "the held-out runs worse" if gain.sound else "with numbers that physics does not admit"
     said = f"{effect.label} fitted the training runs better but {why}, and is not accepted."
-    return dataclasses.replace(judged, notes=[*judged.notes, said], refused=(*judged.refused, effect))
+    return dataclasses.replace(judged, notes=[*judged.notes, said])
 
 
 def settled(judged: Judged, stand: list[Named]) -> Judged:

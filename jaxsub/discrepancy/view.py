@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from ..effects import Facts, Motion
 from ..estimate import FROM_AFAR, FROM_NEAR, Fit, Problem, estimate_disturbance
-from ..likelihood import Columns, Disturbance, Followed, System, block_products, first_guess, follow, whitened_squares
+from ..likelihood import Columns, Disturbance, Followed, System, first_guess, follow, products, whitened_squares
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .whiteness import record_sigma
@@ -168,16 +168,6 @@ class _Led:
             whole = np.asarray(gram)
             step = np.linalg.solve(whole[1:, 1:], whole[1:, 0]) / at.length
         return vehicle
-
-
-@eqx.filter_jit
-def products(
-    disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "b b"]
-) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
-    """Products of all columns whitened, the `prior` of the first b included; half the residuals' log-determinant."""
-    parts, spread = block_products(disturbance, system, columns, 1)
-    b = len(prior)
-    return jnp.sum(parts, axis=(0, 1)).at[:b, :b].add(prior), spread
 
 
 @eqx.filter_jit

@@ -103,7 +103,7 @@ def restricted(
     The first of the `columns` is the residual, the others are fitted to it; `prior` is the Gram matrix of the residual
     and columns of their priors.
     """
-    gram, spread = _gram(disturbance, system, columns, prior)
+    gram, spread = products(disturbance, system, columns, prior)
     among = jnp.linalg.cholesky(gram[1:, 1:])
     explained = solve_triangular(among, gram[1:, 0], lower=True)
     return spread + jnp.sum(jnp.log(jnp.diagonal(among))) + 0.5 * (gram[0, 0] - explained @ explained)
@@ -113,11 +113,14 @@ def fitted(
     disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "p1 p1"]
 ) -> Float[Array, " p1"]:
     """One for the residual and for each other column minus the weight with which it is fitted to it."""
-    gram, _ = _gram(disturbance, system, columns, prior)
+    gram, _ = products(disturbance, system, columns, prior)
     return jnp.concatenate([jnp.ones(1), -jnp.linalg.solve(gram[1:, 1:], gram[1:, 0])])
 
 
-def _gram(disturbance: Disturbance, system: System, columns: Columns, prior: Array) -> tuple[Array, Array]:
+@eqx.filter_jit
+def products(
+    disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "q q"]
+) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
     """Products of the whitened columns, the priors' included, and half the residuals' log-determinant."""
     gram, spread = innovation_products(*steps(disturbance, system, columns))
     return gram + prior, spread

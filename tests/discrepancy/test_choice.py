@@ -24,7 +24,7 @@ def test_twins_that_a_linear_picture_confuses_are_told_apart_by_their_fits():
 def test_probabilities_of_twins_are_those_of_their_fits_and_others_keep_theirs():
     """Claim: the share of a group is divided by evidence, and what was not fitted stays as it was."""
     quadratic, cubic, friction = QuadraticDamping("x", -0.5), CubicDamping("x", -0.5), CoulombFriction("x", 0.01)
-    named = Named(3, quadratic, 0.2, [(cubic, 0.6), (friction, 0.2)], [(4, cubic)])
+    named = Named(3, quadratic, 0.2, [(cubic, 0.6), (friction, 0.2)], [4])
     found = refitted(named, [(quadratic, -100.0), (cubic, -100.0 - np.log(3.0))])
     assert found.probability == pytest.approx(0.6)
     assert {effect.name: p for effect, p in found.rivals} == pytest.approx(
