@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..estimate import FROM_NEAR, estimate_disturbance
-from ..likelihood import Columns, Disturbance, System, block_products
+from ..likelihood import Columns, Disturbance, System, part_products
 from .columns import force_columns
 from .view import View, lengths
 
@@ -31,8 +31,6 @@ from .view import View, lengths
 SLOTS = 8
 # parts of the recordings, each to be predicted from the others
 _PARTS = 4
-# blocks that each part of a run is filtered in: memory is that of one
-_BLOCKS = 4
 # shares of the disturbance that the model without candidates asks for: what was left out may be part or all of it
 _SHARES = (1.0, 0.1, 0.003)
 
@@ -189,9 +187,8 @@ def _parts(
     disturbance: Disturbance, system: System, columns: Columns, pieces: int
 ) -> tuple[Float[Array, "m q q"], Float[Array, ""]]:
     """Products of all columns whitened in `pieces` of every run, and half the log-determinant of all."""
-    found, spread = block_products(disturbance, system, columns, pieces * _BLOCKS)
-    r, _, q, _ = found.shape
-    return jnp.sum(found.reshape(r * pieces, _BLOCKS, q, q), axis=1), spread
+    found, spread = part_products(disturbance, system, columns, pieces)
+    return found.reshape(-1, *found.shape[2:]), spread
 
 
 def evidence_of(view: View) -> float:

@@ -19,7 +19,7 @@ from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
 from ..recording.runs import Runs
-from .innovation_products import Steps, innovation_products, passes, products_by_block
+from .innovation_products import Steps, innovation_products, passes, products_by_part
 from .sensitivity import Jacobians, Linearised, propagate
 
 
@@ -139,11 +139,11 @@ def whitened_squares(disturbance: Disturbance, system: System, columns: Columns)
     return jnp.sum(squares, axis=(0, 1))
 
 
-def block_products(
-    disturbance: Disturbance, system: System, columns: Columns, blocks: int
-) -> tuple[Float[Array, "r b q q"], Float[Array, ""]]:
-    """Products of all columns whitened, in each of `blocks` parts of every run; half the log-determinant of all."""
-    return products_by_block(*steps(disturbance, system, columns), blocks)
+def part_products(
+    disturbance: Disturbance, system: System, columns: Columns, parts: int
+) -> tuple[Float[Array, "r m q q"], Float[Array, ""]]:
+    """Products of all columns whitened, in each of `parts` of every run; half the log-determinant of all."""
+    return products_by_part(*steps(disturbance, system, columns), parts)
 
 
 def steps(disturbance: Disturbance, system: System, columns: Columns) -> tuple[Steps, Float[Array, "z z"]]:
@@ -152,9 +152,8 @@ def steps(disturbance: Disturbance, system: System, columns: Columns) -> tuple[S
     # a step after the last sample, so that one loop serves all; it leads nowhere
     last = lambda M: jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
     noise = jnp.where(system.measured, disturbance.noise, 1.0) ** 2
-    forcing = None if columns.forcing is None else last(columns.forcing)
     begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
-    return Steps(last(F), last(B), system.C, noise, columns.shown, forcing), begin
+    return Steps(last(F), last(B), system.C, noise, columns.shown, columns.forcing), begin
 
 
 def transition(disturbance: Disturbance, system: System) -> tuple[Float[Array, "r k1 z z"], Float[Array, "r k1 z n"]]:

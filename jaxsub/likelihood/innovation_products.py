@@ -12,6 +12,7 @@ $\bar E = K^T\lambda_f + u(\bar G + \bar G^T),\quad
 and P, X, C take their shares of these. Source: de Jong (1991), Ann. Statist. 19, for many columns at once.
 """
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
@@ -22,13 +23,16 @@ from jaxtyping import Array, Float
 
 T = TypeVar("T")
 
+# samples whose innovations are held until their products are taken
+_AT_ONCE = 64
+
 
 class Steps(NamedTuple):
     """R runs of K samples of z = [x, d], of which C sees the first s; q columns.
 
     **Fields**
 
-    z ← F z - forcing + B w after each sample; `noise` is the variance of each channel.
+    z ← F z - forcing + B w after each sample, forcing but the last; `noise` is the variance of each channel.
     """
 
     F: Float[Array, "r k z z"]
@@ -36,7 +40,7 @@ class Steps(NamedTuple):
     C: Float[Array, "r k c s"]
     noise: Float[Array, "r k c"]
     shown: Float[Array, "r k c q"]
-    forcing: Float[Array, "r k s q"] | None
+    forcing: Float[Array, "r k1 s q"] | None
 
 
 class Passed(NamedTuple):
@@ -69,7 +73,7 @@ def _met(carry: tuple[Array, Array], at: Steps) -> tuple[tuple[Array, Array], Pa
 
 
 def _run(at: Steps, begin: Array, step: Callable) -> Any:
-    """`step` over the samples (or blocks of them) of one run."""
+    """`step` over the samples of one run."""
     return jax.lax.scan(step, (begin, jnp.zeros((len(begin), at.shown.shape[-1]), at.shown.dtype)), at)[1]
 
 
@@ -80,35 +84,48 @@ def passes(steps: Steps, begin: Float[Array, "z z"], of: Callable[[Passed], T]) 
         carry, passed = _met(carry, at)
         return carry, of(passed)
 
-    return jax.vmap(lambda at: _run(at, begin, step))(steps)
+    # a step after the last sample, so that one loop serves all; it leads nowhere
+    beyond = lambda M: jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
+    whole = steps if steps.forcing is None else steps._replace(forcing=beyond(steps.forcing))
+    return jax.vmap(lambda at: _run(at, begin, step))(whole)
 
 
-def products_by_block(
-    steps: Steps, begin: Float[Array, "z z"], blocks: int
-) -> tuple[Float[Array, "r b q q"], Float[Array, ""]]:
-    """Products of the whitened innovations in each of `blocks` parts of every run; half the log-determinant of all.
+def products_by_part(
+    steps: Steps, begin: Float[Array, "z z"], parts: int
+) -> tuple[Float[Array, "r m q q"], Float[Array, ""]]:
+    """Products of the whitened innovations in each of `parts` of every run; half the log-determinant of all.
 
-    What is stored besides is one block's innovations, however long the runs are.
+    What is stored besides the steps are a few samples' innovations, however long the runs are. Samples are read where
+    they lie, for copies of very many columns would take longer than to filter them.
     """
-    length = -(-steps.noise.shape[1] // blocks)
-    # nothing is seen beyond the end, with unit noise, and adds nothing
-    beyond = lambda M, value: jnp.pad(
-        M, [(0, 0), (0, blocks * length - M.shape[1]), *[(0, 0)] * (M.ndim - 2)], constant_values=value
-    )
-    padded = jax.tree.map(lambda M: beyond(M, 0.0), steps)._replace(noise=beyond(steps.noise, 1.0))
-    cut = jax.tree.map(lambda M: M.reshape(M.shape[0], blocks, length, *M.shape[2:]), padded)
+    runs, samples, q = steps.noise.shape[0], steps.noise.shape[1], steps.shown.shape[-1]
+    pieces = max(1, round(samples / parts / _AT_ONCE))
+    length = -(-samples // (parts * pieces))
 
-    def sample(carry: tuple[Array, Array], at: Steps) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    def met(run: Array, carry: tuple[Array, Array], k: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        at = jax.tree.map(lambda M: M[run, jnp.minimum(k, M.shape[1] - 1)], steps)
+        # nothing is seen beyond the end, with unit noise, and adds nothing
+        seen = lambda M, otherwise: jnp.where(k < samples, M, otherwise)
+        at = at._replace(C=seen(at.C, 0.0), noise=seen(at.noise, 1.0), shown=seen(at.shown, 0.0))
         carry, passed = _met(carry, at)
         return carry, (passed.white, jnp.sum(jnp.log(jnp.diagonal(passed.factor))))
 
-    def block(carry: tuple[Array, Array], at: Steps) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        carry, (white, logarithm) = jax.lax.scan(sample, carry, at)
-        flat = white.reshape(-1, white.shape[-1])
-        return carry, (flat.T @ flat, jnp.sum(logarithm))
+    def of_run(run: Array) -> tuple[Array, Array]:
+        def piece(carry: tuple, first: Array) -> tuple[tuple, Array]:
+            state, gram = carry
+            state, (white, logarithm) = jax.lax.scan(functools.partial(met, run), state, first + jnp.arange(length))
+            flat = white.reshape(-1, q)
+            return (state, gram + flat.T @ flat), jnp.sum(logarithm)
 
+        def part(state: tuple[Array, Array], firsts: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+            (state, gram), logarithm = jax.lax.scan(piece, (state, jnp.zeros((q, q), nothing.dtype)), firsts)
+            return state, (gram, jnp.sum(logarithm))
+
+        return jax.lax.scan(part, (begin, nothing), length * jnp.arange(parts * pieces).reshape(parts, pieces))[1]
+
+    nothing = jnp.zeros((len(begin), q), steps.shown.dtype)
     # one run after the other: products of three dimensions are slower than three of two
-    gram, logarithm = jax.lax.map(lambda at: _run(at, begin, block), cut)
+    gram, logarithm = jax.lax.map(of_run, jnp.arange(runs))
     return gram, jnp.sum(logarithm)
 
 
@@ -146,7 +163,7 @@ def _back(kept: tuple[Steps, Passed], given: tuple[Array, Array]) -> tuple[Steps
         filtered = passed.X + passed.half.T @ passed.white, passed.P - passed.half.T @ passed.half
         left, weighed = at.F.T @ lever, at.F.T @ weight
         of_F = lever @ filtered[0].T + 2.0 * weight @ at.F @ filtered[1]
-        of_B, of_forcing = 2.0 * weight @ at.B, None if at.forcing is None else -lever[:s]
+        of_B, of_forcing = 2.0 * weight @ at.B, None if steps.forcing is None else -lever[:s]
         weight = weighed @ at.F
         told, kept = gain @ left, gain @ weight
         pull = u @ both
@@ -167,7 +184,8 @@ def _back(kept: tuple[Steps, Passed], given: tuple[Array, Array]) -> tuple[Steps
         (_, begun), found = jax.lax.scan(step, nothing, samples, reverse=True)
         return begun, found
 
-    begun, found = jax.vmap(run)(steps, passed, u, gain, inverse)
+    begun, found = jax.vmap(run)(steps._replace(forcing=None), passed, u, gain, inverse)
+    found = found if steps.forcing is None else found._replace(forcing=found.forcing[:, :-1])
     return found, jnp.sum(begun, axis=0)
 
 

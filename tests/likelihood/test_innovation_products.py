@@ -15,7 +15,7 @@ def some_steps(forced: bool) -> tuple[Steps, jax.Array]:
     rng = np.random.default_rng(11)
     draw = lambda *shape: jnp.asarray(rng.normal(size=shape))
     root = draw(Z, Z)
-    forcing = draw(R, K, S, Q) if forced else None
+    forcing = draw(R, K - 1, S, Q) if forced else None
     noise = 1.0 + draw(R, K, C) ** 2
     steps = Steps(
         0.5 * draw(R, K, Z, Z), draw(R, K, Z, N), draw(R, K, C, S), noise, draw(R, K, C, Q), forcing
@@ -46,7 +46,7 @@ def test_products_are_those_of_the_dense_gaussian():
     gram, spread = np.zeros((Q, Q)), 0.0
     for r in range(R):
         F, B, output, noise, shown = (np.asarray(part[r]) for part in steps[:5])
-        forcing = np.asarray(steps.forcing[r])
+        forcing = np.pad(np.asarray(steps.forcing[r]), ((0, 1), (0, 0), (0, 0)))
         cov, mean = np.zeros((K * C, K * C)), np.zeros((K * C, Q))
         state, states = np.zeros((Z, Q)), [np.asarray(begin)]
         for k in range(K):
