@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect, candidates
+from ..effects import AbstractEffect, candidates, looked_at
 from ..errors import InputError
 from ..estimate import Fit, fit
 from ..likelihood import Disturbance
@@ -131,10 +131,11 @@ def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, pro
     """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
     make_room()
     present = {effect.label for effect in view.vehicle.effects}
-    listed = [effect for effect in candidates(facts(view), vocabulary) if effect.label not in present]
+    known = facts(view)
+    listed = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
     columns, owners = candidate_columns(view, listed)
     evidence = Evidence.of(view, columns)
-    selector = Selector(evidence, listed, owners)
+    selector = Selector(evidence, listed, owners, looked_at(known, vocabulary))
     naming = name(selector, progress)
     if naming.again:
         return Found(view, selector, naming, None)

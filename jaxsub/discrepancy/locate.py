@@ -11,14 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import AbstractActuator, AbstractEffect, AbstractSensor, Motion, by_name, velocities
-from ..likelihood import Columns, Disturbance, fitted, products, smoothed
+from ..likelihood import Disturbance, products
 from ..recording import Recording
 from .columns import difference, force_columns, output_columns
 from .diagnosis import ForceTrace, Location
 from .evidence import Evidence
 from .process_noise import NoiseSignal
 from .selector import Scan
-from .view import View
+from .view import View, missing_force
 
 _SIGNIFICANT = 2.5
 # of a force where the filter's process noise rises too
@@ -46,10 +46,7 @@ class Field:
 
 def traces(view: View, recordings: Sequence[Recording]) -> list[ForceTrace]:
     """The force that each of `recordings` asks for beyond the model."""
-    weights = fitted(view.disturbance, view.followed.system, view.base, view.prior)
-    assert view.base.forcing is not None
-    left = Columns((view.base.shown @ weights)[..., None], (view.base.forcing @ weights)[..., None])
-    mean, spread = (np.asarray(a) for a in smoothed(view.disturbance, view.followed.system, left))
+    mean, spread = missing_force(view)
     found = []
     for run, recording in enumerate(recordings):
         k = len(recording.times)

@@ -139,13 +139,9 @@ def standing(selector: Selector, chosen: Sequence[int], refused: Collection[int]
 def named_on(selector: Selector, others: Sequence[int], index: int, refused: Collection[int] = ()) -> Named:
     """The probability of a candidate on top of `others`, and of what might stand there and was not `refused`."""
     scan = selector.scan(others)
-    forms: dict[str, int] = {}
-    for effect in selector.candidates:
-        forms[effect.name] = forms.get(effect.name, 0) + 1
-    log = scan.value - np.log([forms[effect.name] for effect in selector.candidates])
     out = {selector.candidates[i].name for i in refused} - {selector.candidates[index].name}
     may = selector.stand_in(others, index) & np.array([effect.name not in out for effect in selector.candidates])
-    log = np.where(may, log, -np.inf)
+    log = np.where(may, scan.value, -np.inf)
     weights = np.exp(log - np.max(log))
     weights /= np.sum(weights)
     by_name: dict[str, float] = {}

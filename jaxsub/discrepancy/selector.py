@@ -1,7 +1,8 @@
 """What every candidate effect would add to those already chosen, and which of them to take next."""
 
+import collections
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import jax.numpy as jnp
 import numpy as np
@@ -29,7 +30,8 @@ class Scan:
 
     **Fields**
 
-    - `value`: (m,) log evidence at the disturbance that suits each best; minus infinity where physics forbids it.
+    - `value`: (m,) as `Selector.value`, at the disturbance that suits each best; minus infinity where physics forbids
+      it.
     - `statistic`: (m,) χ² over the chosen ones alone. `effects`: with predicted numbers. `right`: (m,) of admissible
       sign.
     """
@@ -43,7 +45,13 @@ class Scan:
 class Selector:
     """The evidence of sets of candidates, and the disturbances estimated for some of them."""
 
-    def __init__(self, evidence: Evidence, candidates: Sequence[AbstractEffect], owners: Sequence[Sequence[int]]):
+    def __init__(
+        self,
+        evidence: Evidence,
+        candidates: Sequence[AbstractEffect],
+        owners: Sequence[Sequence[int]],
+        looked_at: Mapping[str, int],
+    ):
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
         self.kept = evidence.products[0].kept(self.owners)
         self.usable = np.isfinite(self.kept) & (self.kept > _ABSORBED)
@@ -53,16 +61,20 @@ class Selector:
         still = Disturbance(_STILL * own.force, own.time, jnp.ones_like(own.noise))
         self.free = evidence.under(still)
         self.freely: set[int] = set()
-        # forms of one effect are one trial
-        self.tried = len({(effect.label, *effect.symbols()) for effect in self.candidates})
+        forms = collections.Counter(effect.name for effect in self.candidates)
+        # every name is as probable as any other before the data, and within a name every form
+        self.prior = -np.log([looked_at.get(effect.name, forms[effect.name]) for effect in self.candidates])
+        # forms on the grid of one effect are one trial
+        listed = {(effect.label, *effect.symbols()) for effect in self.candidates if effect.name not in looked_at}
+        self.tried = len(listed) + sum(looked_at.values())
 
     def columns(self, chosen: Sequence[int]) -> list[int]:
         """The columns of candidates."""
         return [column for i in chosen for column in self.owners[i]]
 
     def value(self, chosen: Sequence[int]) -> float:
-        """Log evidence at the best disturbance."""
-        return self.evidence.best(self.columns(chosen))[0]
+        """Log evidence at the best disturbance, and how probable such forms are before the data."""
+        return self.evidence.best(self.columns(chosen))[0] + float(np.sum(self.prior[list(chosen)]))
 
     def estimate(self, chosen: Sequence[int]) -> None:
         """Find the disturbance that is left with `chosen` in the model."""
@@ -75,7 +87,7 @@ class Selector:
     def scan(self, chosen: Sequence[int]) -> Scan:
         """Every candidate on top of `chosen`."""
         own = self.columns(chosen)
-        base = self.value(chosen)
+        base = self.evidence.best(own)[0]
         best, statistic = np.full(len(self.candidates), -np.inf), np.zeros(len(self.candidates))
         sizes: list[np.ndarray] = [np.zeros(len(columns)) for columns in self.owners]
         for products in self.evidence.products:
@@ -94,7 +106,8 @@ class Selector:
             # worth a look only where it may be chosen
             right.append(good and (statistic[i] < _LOOKED_AT or plausible(self.evidence.view.path, predicted)))
         fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
-        return Scan(np.where(fine, best, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
+        value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
+        return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
 
     def foremost(self, chosen: Sequence[int], scan: Scan) -> int:
         """Which candidate to take next: the most probable, unless a free run asks for another and hardly for it.

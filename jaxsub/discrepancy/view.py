@@ -9,11 +9,23 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..effects import Facts, Motion
+from ..effects import Facts, Motion, wave_band
 from ..estimate import FROM_AFAR, FROM_NEAR, Fit, Problem, estimate_disturbance
-from ..likelihood import Columns, Disturbance, Followed, System, first_guess, follow, products, whitened_squares
+from ..likelihood import (
+    Columns,
+    Disturbance,
+    Followed,
+    System,
+    first_guess,
+    fitted,
+    follow,
+    products,
+    smoothed,
+    whitened_squares,
+)
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
+from .tones import tones
 from .whiteness import record_sigma
 
 # scoring steps where the disturbance is known
@@ -177,6 +189,15 @@ def lengths(disturbance: Disturbance, system: System, columns: Columns) -> Float
     return jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
 
 
+def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndarray, "r k n"]]:
+    """The force (N, N m) that the recordings ask for beyond the model given all samples, and its standard deviation."""
+    weights = fitted(view.disturbance, view.followed.system, view.base, view.prior)
+    assert view.base.forcing is not None
+    left = Columns((view.base.shown @ weights)[..., None], (view.base.forcing @ weights)[..., None])
+    mean, spread = smoothed(view.disturbance, view.followed.system, left)
+    return np.asarray(mean), np.asarray(spread)
+
+
 def facts(view: View) -> Facts:
     """What the vocabulary needs to know to list its candidates."""
     layout, runs, path = view.vehicle.layout, view.runs, view.path
@@ -185,6 +206,11 @@ def facts(view: View) -> Facts:
     body = layout.kind == "submerged-body"
     depth = np.asarray(path.seen.positions["z"]) if body else np.zeros(1)
     shown = {c: outputs[..., i][mask[..., i]] for i, c in enumerate(layout.channels)}
+    duration, interval = float(np.max(np.sum(path.steps, axis=1))), float(np.median(path.steps[live]))
+    shaking, frequencies = [], 0
+    if body and duration > 0.0:
+        there = np.pad(live, [(0, 0), (1, 0)], constant_values=True)
+        shaking, frequencies = tones(missing_force(view)[0], path.times, there, wave_band(duration, interval))
     return Facts(
         layout.kind,
         layout.equations,
@@ -194,12 +220,14 @@ def facts(view: View) -> Facts:
         layout.length,
         layout.diameter,
         {e: rms(path.start.rates[e]) for e in layout.equations},
-        float(np.median(path.steps[live])),
-        duration=float(np.max(np.sum(path.steps, axis=1))),
+        interval,
+        duration=duration,
         position_scale={} if body else {q: float(np.max(np.abs(path.seen.positions[q]))) for q in layout.equations},
         input_range={name: _commanded(path, live, i) for i, (name, _) in enumerate(layout.inputs)},
         output_range={c: (float(values.min()), float(values.max())) for c, values in shown.items() if len(values)},
         depth_range=(float(depth.min()), float(depth.max())),
+        tones=dict(zip(layout.equations, shaking, strict=False)),
+        frequencies=frequencies,
     )
 
 

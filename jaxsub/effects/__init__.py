@@ -18,7 +18,7 @@ from .base import (
     with_numbers,
 )
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
-from .environment import Current, WaveForcing
+from .environment import Current, WaveForcing, wave_band
 from .events import MassShift, ThrustLoss
 from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss
 from .hull_damping import CubicDamping, QuadraticDamping
@@ -43,7 +43,7 @@ from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
 from .sensors import SensorBias, SensorDrift, SensorScale
 from .smooth import KNOTS, SmoothForce, variables
-from .vocabulary import VOCABULARY, candidates, from_script, vocabulary
+from .vocabulary import VOCABULARY, candidates, from_script, looked_at, vocabulary
 
 __all__ = [
     "CHANNEL_UNITS",
@@ -112,6 +112,7 @@ __all__ = [
     "by_name",
     "candidates",
     "from_script",
+    "looked_at",
     "number_fields",
     "numbers",
     "options",
@@ -121,6 +122,7 @@ __all__ = [
     "variables",
     "velocities",
     "vocabulary",
+    "wave_band",
     "with_memory",
     "with_numbers",
 ]

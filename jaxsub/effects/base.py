@@ -46,6 +46,11 @@ class AbstractEffect(eqx.Module):
     def candidates(cls, facts: Facts) -> "Sequence[Self]":
         """The forms of this effect that make sense on a vehicle, amplitudes zero and shapes on a grid."""
 
+    @classmethod
+    def looked_at(cls, facts: Facts) -> int:
+        """How many forms there were, where `candidates` are the most promising of more; zero where they are all."""
+        return 0
+
     @property
     @abc.abstractmethod
     def where(self) -> tuple[str, ...]:

@@ -12,6 +12,9 @@ from ..parameters import number
 from .base import AbstractForce, amplitude, shape
 from .motion import EQUATIONS, FORCES, Facts, Motion, Signal, unit_per
 
+# s
+_LONGEST_PERIOD = 30.0
+
 
 class Current(AbstractForce):
     r"""A steady horizontal current $V_N, V_E$ (m/s, over ground, of either sign), where velocities are over ground.
@@ -55,6 +58,15 @@ class Current(AbstractForce):
         return {e: -(row[0] * u + row[1] * v + row[2] * w) for e, row in rows.items()}
 
 
+def wave_band(duration: float, sample_interval: float) -> tuple[float, float]:
+    """Frequencies (rad/s) of waves that runs of `duration` (s) sampled at an interval (s) can show.
+
+    From two periods in a run to four samples in a period. Waves of the sea that push a vehicle have periods below half
+    a minute; what is slower is no wave. Source: Munk (1950), Proc. 1st Conf. Coastal Eng., fig. 1.
+    """
+    return max(4.0 * np.pi / duration, 2.0 * np.pi / _LONGEST_PERIOD), 0.5 * np.pi / sample_interval
+
+
 class WaveForcing(AbstractForce):
     r"""A regular wave in one equation: $\tau_i = a\cos\omega t + b\sin\omega t$.
 
@@ -72,12 +84,15 @@ class WaveForcing(AbstractForce):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[WaveForcing]":
-        """Each free equation of a body, from two periods in the longest run to four samples in a period."""
-        slowest, fastest = 4.0 * np.pi / max(facts.duration, 1e-9), 0.5 * np.pi / facts.sample_interval
-        if facts.kind != "submerged-body" or facts.duration <= 0.0 or slowest >= fastest:
+        """Each free equation of a body at the frequencies that stand out of what the model misses in it."""
+        if facts.kind != "submerged-body":
             return []
-        grid = np.geomspace(slowest, fastest, 24).tolist()
-        return [cls(e, omega=number(w)) for e in facts.equations for w in grid]
+        return [cls(e, omega=number(w)) for e in facts.equations for w in facts.tones.get(e, ())]
+
+    @classmethod
+    def looked_at(cls, facts: Facts) -> int:
+        """Every frequency of every equation."""
+        return len(facts.equations) * facts.frequencies
 
     @property
     def where(self) -> tuple[str, ...]:

@@ -84,6 +84,8 @@ class Facts(eqx.Module):
     - `input_range`: rms, largest size and largest rate (per s) of each actuator's command.
     - `output_range`: least and largest of what was recorded of each channel.
     - `depth_range`: least and largest depth, m.
+    - `tones`: frequencies (rad/s) at which what each equation misses stands out, inside `wave_band`; `frequencies`: how
+      many they were chosen among.
 
     What is not known (zero or absent) has no candidates whose grid is taken from it.
     """
@@ -102,6 +104,8 @@ class Facts(eqx.Module):
     input_range: dict[str, tuple[float, float, float]] = eqx.field(default_factory=dict)
     output_range: dict[str, tuple[float, float]] = eqx.field(default_factory=dict)
     depth_range: tuple[float, float] = (0.0, 0.0)
+    tones: dict[str, tuple[float, ...]] = eqx.field(default_factory=dict)
+    frequencies: int = 0
 
     @property
     def largest_commands(self) -> dict[str, float]:

@@ -130,3 +130,9 @@ def is_effect(kind: object) -> bool:
 def candidates(facts: Facts, kinds: tuple[type[AbstractEffect], ...] | None = None) -> list[AbstractEffect]:
     """Every form that makes sense on a vehicle of every effect of `kinds`, by default of `vocabulary`."""
     return [effect for kind in (vocabulary() if kinds is None else kinds) for effect in kind.candidates(facts)]
+
+
+def looked_at(facts: Facts, kinds: tuple[type[AbstractEffect], ...] | None = None) -> dict[str, int]:
+    """How many forms the candidates of each effect were chosen among, by its name, where they are not all."""
+    counts = {kind.name: kind.looked_at(facts) for kind in (vocabulary() if kinds is None else kinds)}
+    return {name: count for name, count in counts.items() if count}

@@ -185,8 +185,8 @@ def _back(kept: tuple[Steps, Passed], given: tuple[Array, Array]) -> tuple[Steps
         return begun, found
 
     begun, found = jax.vmap(run)(steps._replace(forcing=None), passed, u, gain, inverse)
-    found = found if steps.forcing is None else found._replace(forcing=found.forcing[:, :-1])
-    return found, jnp.sum(begun, axis=0)
+    forcing = None if found.forcing is None else found.forcing[:, :-1]
+    return found._replace(forcing=forcing), jnp.sum(begun, axis=0)
 
 
 innovation_products.defvjp(_forth, _back)

@@ -93,7 +93,7 @@ def test_the_concealed_effect_comes_first_with_its_amplitude(effect, field, tole
     view = look(fit(wrong(), batch(wrong(), recorded(effect, 2)[:2])))
     tried = candidates(facts(view))
     columns, owners = candidate_columns(view, tried)
-    selector = Selector(Evidence.of(view, columns), tried, owners)
+    selector = Selector(Evidence.of(view, columns), tried, owners, {})
     chosen, scans, p_values = select(selector, lambda message: None)
     assert [tried[i].name for i in chosen] == [effect.name]
     assert p_values[0] < 1e-6 < 0.01 < p_values[1]
@@ -109,6 +109,6 @@ def test_wrong_scale_of_the_noise_raises_no_alarm():
     np.testing.assert_allclose(view.disturbance.noise, 2.0, rtol=0.15)
     tried = candidates(facts(view))
     columns, owners = candidate_columns(view, tried)
-    chosen, _, p_values = select(Selector(Evidence.of(view, columns), tried, owners), lambda message: None)
+    chosen, _, p_values = select(Selector(Evidence.of(view, columns), tried, owners, {}), lambda message: None)
     assert chosen == [] and p_values[0] > 0.01
     assert jnp.isfinite(view.covariance).all()

@@ -23,6 +23,8 @@ from jaxsub.effects import (
     TurningSpeedLoss,
     WaveForcing,
     admissible,
+    looked_at,
+    wave_band,
 )
 
 NOW = motion(BODY, count=60)
@@ -57,12 +59,20 @@ def test_wave_is_a_sine_of_the_runs_time():
     np.testing.assert_allclose(found, np.sqrt(5.0) * np.cos(0.7 * t + np.arctan2(1.0, 2.0)), rtol=1e-11, atol=1e-11)
 
 
-def test_wave_frequencies_are_those_that_record_and_samples_resolve():
-    grid = sorted({float(e.omega) for e in WaveForcing.candidates(BODY)})
-    assert len(grid) == 24
-    assert 2.0 * np.pi / grid[0] == pytest.approx(BODY.duration / 2.0)
-    assert 2.0 * np.pi / grid[-1] == pytest.approx(4.0 * BODY.sample_interval)
-    assert WaveForcing.candidates(dataclasses.replace(BODY, duration=0.0)) == []
+def test_wave_frequencies_are_those_that_stand_out_and_all_that_were_looked_at_count():
+    """Claim: a candidate for each tone of each equation; a rig has none; every frequency in every equation counts."""
+    found = [(e.equation, float(e.omega)) for e in WaveForcing.candidates(BODY)]
+    assert found == [(equation, omega) for equation in EQUATIONS for omega in (0.9, 2.1)]
+    assert WaveForcing.candidates(RIG) == []
+    assert looked_at(BODY) == {"wave-forcing": 6 * 150}
+
+
+@pytest.mark.parametrize(("duration", "longest"), [(20.0, 10.0), (600.0, 30.0)])
+def test_wave_band_is_what_record_and_samples_resolve_and_the_sea_has(duration, longest):
+    """Claim: from two periods in a run, and half a minute at most, to four samples in a period."""
+    slow, fast = wave_band(duration, 0.2)
+    assert 2.0 * np.pi / slow == pytest.approx(longest)
+    assert 2.0 * np.pi / fast == pytest.approx(0.8)
 
 
 def test_suction_pulls_towards_its_boundary_and_dies_out():
