@@ -19,15 +19,15 @@ from .evidence import Evidence
 from .generic import pattern
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
-from .name import Named, name
+from .name import MOST_EFFECTS, Named, name
 from .process_noise import noise_note, noise_signals
 from .programs import make_room
 from .progress import Progress
 from .selector import Selector
 from .show import channel_quality, coefficients, estimates, overlays, run_quality
-from .trial import Found, Model, Trial, tried, unnamed
+from .trial import Found, Model, Trial, tried, unnamed, worth_trying
 from .verdict import NOTHING, Judged, both, judge, summary
-from .view import View, facts, look
+from .view import View, facts, look, whiteness
 
 # that a next manoeuvre is to tell from what was named
 _RIVALS = 2
@@ -68,17 +68,22 @@ def diagnose(
 def explained(
     trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged]:
-    """The best model, and what is to be said: looked at again where a free run asked for an effect that then stands."""
+    """The best model, and what is to be said.
+
+    Everything is looked at again from a model with what stands, where a free run asked for it or others fell.
+    """
     best, judged = baseline, NOTHING
     while True:
-        said = judge(found.naming, found.pattern)
-        if said.named:
-            best, said = tried(trial, best, found, said)
-        elif said.verdict == "unknown" and not best.added:
+        said = judge(found.naming, found.pattern, found.white)
+        chosen = worth_trying(found, said)
+        if chosen:
+            best, said = tried(trial, best, found, chosen, said)
+        if said.verdict == "unknown" and not best.added:
             # it stands for all that is missing, and not beside what was named
             best, said = unnamed(trial, best, found, said)
         judged = both(judged, said)
-        if not (found.naming.again and said.named):
+        whole = len(said.named) == len(found.naming.named) and not found.naming.again
+        if not said.named or whole or len(best.added) >= MOST_EFFECTS:
             return best, judged
         found = examine(best.view, vocabulary, trial.progress)
 
@@ -138,10 +143,10 @@ def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, pro
     selector = Selector(evidence, listed, owners, looked_at(known, vocabulary))
     naming = name(selector, progress)
     if naming.again:
-        return Found(view, selector, naming, None)
+        return Found(view, selector, naming, None, 1.0)
     progress("looking for forces without a name")
     asked: list[Disturbance] = [evidence.best([])[1].disturbance, naming.products.disturbance]
-    return Found(view, selector, naming, pattern(view, evidence, naming.columns, asked))
+    return Found(view, selector, naming, pattern(view, evidence, naming.columns, asked), whiteness(view))
 
 
 def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:

@@ -2,12 +2,13 @@
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import special
 
 from ..effects import KNOTS, SmoothForce, variables, with_numbers
-from ..likelihood import Disturbance
+from ..likelihood import Columns, Disturbance
 from .columns import force_columns
 from .evidence import Evidence
 from .selector import SIGNIFICANCE
@@ -81,7 +82,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], disturbances: list
     forces = smooth_forces(view)
     if not forces:
         return None
-    hats = force_columns(view, [column for force in forces for column in _hats(view, force)])
+    hats = _all_hats(view, forces)
     own = chosen.picked(columns)
     evidence = Evidence.of(view, own + hats, disturbances)
     held = list(range(len(columns)))
@@ -97,6 +98,19 @@ def pattern(view: View, chosen: Evidence, columns: list[int], disturbances: list
     both = [*held, *owners[best]]
     predicts = evidence.best(both)[1].predicted(both) > products.predicted(held)
     return Pattern(force, p_value, predicts, alone, _explained(evidence, held, owners[best]))
+
+
+def most_explained(view: View, disturbance: Disturbance) -> float:
+    """The largest share of the errors under a `disturbance` that one smooth force alone explains."""
+    forces = smooth_forces(view)
+    if not forces:
+        return 0.0
+    products = Evidence.of(view, _all_hats(view, forces), [disturbance]).products[0]
+    return float(np.max(products.explained([], [range(KNOTS * i, KNOTS * (i + 1)) for i in range(len(forces))])))
+
+
+def _all_hats(view: View, forces: Sequence[SmoothForce]) -> Columns:
+    return force_columns(view, [column for force in forces for column in _hats(view, force)])
 
 
 def _explained(evidence: Evidence, held: list[int], more: list[int]) -> float:

@@ -19,6 +19,8 @@ _ABSORBED = 1e-4
 _LOOKED_AT = 10.0
 # shares of a free run's errors: a leader that explains so little gives way to one that explains so much
 _LITTLE, _MUCH = 0.02, 0.5
+# times the noise, from which squared errors of a free run are large
+_LARGE = 4.0
 # times the errors that a candidate leaves: what may stand in its place leaves no more
 _NO_MORE = 2.0
 _STILL = 1e-6
@@ -125,6 +127,14 @@ class Selector:
         best = int(np.argmax(np.where(asked, share, -np.inf)))
         self.freely.add(best)
         return best
+
+    def ruling(self, chosen: Sequence[int]) -> int | None:
+        """Which of `chosen` alone explains most of a free run's errors, where they are much larger than the noise."""
+        noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
+        share = self.free.explained([], self.owners)
+        best = max(chosen, key=lambda i: share[i], default=None)
+        large = self.free.gram[0, 0] > _LARGE * noise * self.free.samples
+        return best if best is not None and large and share[best] > _MUCH else None
 
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate may stand where `index` does, on top of `chosen`.

@@ -23,7 +23,7 @@ def tones(
     longest = float(np.max(times[live], initial=0.0))
     interval = float(np.median(np.diff(times, axis=1)[live[:, 1:]]))
     grid = np.arange(0.0, longest + 0.5 * interval, interval)
-    size = int(fft.next_fast_len(_LINES * len(grid), real=True))
+    size = fft.next_fast_len(_LINES * len(grid), real=True) or 0
     whole = np.zeros((size // 2 + 1, force.shape[-1]), complex)
     for t, values, there in zip(times, force, live, strict=True):
         even = np.stack([np.interp(grid, t[there], column, right=0.0) for column in values[there].T], axis=1)

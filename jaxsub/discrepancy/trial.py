@@ -12,7 +12,7 @@ from ..estimate import Fit
 from ..likelihood import Disturbance
 from ..recording.runs import Runs
 from .evidence import evidence_of
-from .generic import Pattern
+from .generic import Pattern, most_explained
 from .model import join, sound
 from .name import Naming, named_on, refitted, standing
 from .programs import make_room
@@ -22,18 +22,24 @@ from .show import HeldOut, Luck, hold, luck
 from .verdict import Judged, helped, settled
 from .view import View, look
 
+# times the errors that a force without a name leaves in a free run
+_MUCH_LESS = 4.0
 # candidates by number with the log evidence of a fit
 Fits = list[tuple[int, float]]
 
 
 @dataclasses.dataclass(frozen=True)
 class Found:
-    """What the vocabulary says about the recordings from one view of them, and a force without a name, if asked."""
+    """What the vocabulary says about the recordings from one view of them, and a force without a name, if asked.
+
+    `white` is the p-value of the view's innovations being white.
+    """
 
     view: View
     selector: Selector
     naming: Naming
     pattern: Pattern | None
+    white: float
 
 
 class Model(NamedTuple):
@@ -101,13 +107,14 @@ class Tries:
         """What the held-out runs gain from the one set to the other."""
         return luck(self.model(fewer).shown, self.model(more).shown, self.sound(more))
 
+    def value(self, numbers: Sequence[int]) -> float:
+        """Log evidence of the fit with these; minus infinity where physics does not admit it."""
+        return evidence_of(self.model(numbers).view) if self.sound(numbers) else -np.inf
+
     def closest(self, others: Sequence[int], index: int) -> Fits:
         """A candidate and its twins with the log evidence of their fits, the `others` beside them; the best first."""
         twins = [number for number in named_on(self.found.selector, others, index).twins if number not in others]
-        if not twins:
-            return [(index, 0.0)]
-        value = lambda i: evidence_of(self.model([*others, i]).view) if self.sound([*others, i]) else -np.inf
-        return sorted([(i, value(i)) for i in (index, *twins)], key=lambda fit: -fit[1])
+        return sorted([(i, self.value([*others, i])) for i in (index, *twins)], key=lambda fit: -fit[1])
 
 
 def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
@@ -127,28 +134,23 @@ def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
     return kept
 
 
-def in_turn(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
-    """What stands of `chosen` when one is added after the other, each as the best of its twins."""
-    kept: dict[int, Fits] = {}
-    for index in chosen:
-        fits = [(index, 0.0)] if index in kept else tries.closest([*kept], index)
-        if fits[0][0] not in kept and tries.helps([*kept], fits[0][0]):
-            kept[fits[0][0]] = fits
-    return kept
+def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
+    """The first of `chosen` that stands by itself, as the best of its twins, the most probable fit first."""
+    for fits in sorted((tries.closest([], index) for index in chosen), key=lambda fits: -fits[0][1]):
+        if tries.helps([], fits[0][0]):
+            return {fits[0][0]: fits}
+    return {}
 
 
-def what_stands(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
-    """Of `chosen`, together or else in turn; looked at again where some fell, for twins depend on what is beside."""
-    kept = together(tries, chosen) if len(chosen) > 1 else {}
-    if kept and len(kept) < len(chosen):
-        return what_stands(tries, [*kept])
-    return kept or in_turn(tries, chosen)
+def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
+    """The model with those of `chosen` that stand on the held-out runs, and what is then to be said.
 
-
-def tried(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
-    """The model with those of the effects `judged` that stand on the held-out runs, and what is then to be said."""
+    All together, or what stands of them so, or else the best that stands alone: where the model errs much, a linear
+    picture adds effects that only make up for each other, and one of them put into the model shows what is left.
+    """
     tries, effects = Tries(trial, base, found), found.selector.candidates
-    kept = what_stands(tries, [one.number for one in found.naming.named])
+    kept = together(tries, chosen) if len(chosen) > 1 else {}
+    kept = kept or alone(tries, chosen)
     refused = [index for index, gain in tries.said.items() if index not in kept and not gain.helps]
     for index in [*refused, *kept]:
         judged = helped(judged, effects[index], tries.said[index])
@@ -156,6 +158,22 @@ def tried(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Mode
     named = standing(found.selector, [*kept], refused)
     stand = [refitted(one, [(effects[i], value) for i, value in kept[one.number]]) for one in named]
     return tries.model([*kept]), settled(judged, stand)
+
+
+def worth_trying(found: Found, judged: Judged) -> list[int]:
+    """By number what was named, or, where nothing was, what rules a free run unless it is something without a name.
+
+    A force that leaves so much less of a free run's errors shows that the ruling effect is not their cause.
+    """
+    numbers = [one.number for one in found.naming.named]
+    if judged.named:
+        return numbers
+    ruling = found.selector.ruling(numbers)
+    if ruling is None:
+        return []
+    free = found.selector.free
+    left = 1.0 - free.explained([], found.selector.owners)[ruling]
+    return [ruling] if left < _MUCH_LESS * (1.0 - most_explained(found.view, free.disturbance)) else []
 
 
 def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:

@@ -14,6 +14,8 @@ _EXPLAINED = 0.75
 # log evidence by which a force without a name must beat the names to stand instead of them
 _CLEARLY = 3.0
 _BEYOND_DOUBT = 1e-6
+# of innovations that are white
+_NOT_WHITE = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,8 +38,8 @@ def both(earlier: Judged, later: Judged) -> Judged:
     return Judged(verdict, named, min(earlier.p_value, later.p_value), notes)
 
 
-def judge(naming: Naming, pattern: Pattern | None) -> Judged:
-    """The verdict before anything was tried on the held-out runs."""
+def judge(naming: Naming, pattern: Pattern | None, white: float) -> Judged:
+    """The verdict before anything was tried on the held-out runs; `white` is the innovations' p-value of being so."""
     follows = pattern is not None and pattern.significant
     # a scan that no choice followed was either not significant or predicted nothing
     least = naming.first_p if naming.named or pattern is None or not follows else min(naming.first_p, pattern.p_value)
@@ -45,6 +47,9 @@ def judge(naming: Naming, pattern: Pattern | None) -> Judged:
     notes: list[str] = []
     if pattern is not None and follows:
         notes.append(f"{pattern.force.expression} is asked for in {pattern.force.equation}: {pattern.described}.")
+    if not naming.named and white < _NOT_WHITE and not follows:
+        notes.append(f"What is left is not random: that its samples are so correlated by chance has p = {white:.2g}.")
+        return Judged("unknown", [], min(p_value, white), notes)
     if not naming.named:
         return Judged("unknown" if follows else "none", [], p_value, notes)
     labels = ", ".join(named.effect.label for named in naming.named)
@@ -73,11 +78,11 @@ def settled(judged: Judged, stand: list[Named]) -> Judged:
 
     Where nothing does, a mismatch that is beyond doubt is unknown, and any other was luck.
     """
+    if stand:
+        return dataclasses.replace(judged, named=stand, verdict=_certainty(stand))
     if not judged.named:
         return judged
-    if not stand:
-        return dataclasses.replace(judged, verdict="unknown" if judged.p_value < _BEYOND_DOUBT else "none", named=[])
-    return dataclasses.replace(judged, named=stand, verdict=_certainty(stand))
+    return dataclasses.replace(judged, verdict="unknown" if judged.p_value < _BEYOND_DOUBT else "none", named=[])
 
 
 def _certainty(named: Sequence[Named]) -> Verdict:

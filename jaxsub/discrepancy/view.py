@@ -20,16 +20,21 @@ from ..likelihood import (
     fitted,
     follow,
     products,
+    restricted,
     smoothed,
+    whitened,
     whitened_squares,
 )
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .tones import tones
-from .whiteness import record_sigma
+from .whiteness import portmanteau, record_sigma
 
-# scoring steps where the disturbance is known
-_STEPS = 4
+_restricted = eqx.filter_jit(restricted)
+# scoring steps under one disturbance
+_STEPS = 2
+# disturbance and numbers are sought in turns until the log likelihood changes by less
+_TURNS, _SETTLED = 8, 0.5
 _LEAST_WHITE = 1e-5
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
@@ -100,22 +105,24 @@ class View:
 def look(fit: Fit, disturbance: Disturbance | None = None) -> View:
     """The view of a fit, its free numbers moved to where innovations are least.
 
-    The search for the disturbance starts from the given one, or from what the residuals ask.
+    The search for the disturbance starts from what the residuals ask, or from the given one where that is better: after
+    a fit that explains more, it is far too large, and numbers that are moved under it are lost.
     """
     led = _Led(fit, fit.problem)
     vehicle = fit.vehicle
-    if disturbance is None:
-        system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
-        disturbance = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
-        for steps in (FROM_AFAR, FROM_NEAR):
-            at = led.at(vehicle, disturbance)
-            disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance, steps)
-            vehicle = led.descend(vehicle, disturbance, 1)
-    else:
-        vehicle = led.descend(vehicle, disturbance, _STEPS)
-        at = led.at(vehicle, disturbance)
-        disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance, FROM_NEAR)
-        vehicle = led.descend(vehicle, disturbance, 1)
+    system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
+    guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
+    starts = [guess] if disturbance is None else [guess, disturbance]
+    disturbance = min(starts, key=lambda start: led.cost(vehicle, start))
+    before = np.inf
+    for turn in range(_TURNS):
+        at, steps = led.at(vehicle, disturbance), FROM_NEAR if turn else FROM_AFAR
+        disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance, steps)
+        vehicle = led.descend(vehicle, disturbance)
+        cost = led.cost(vehicle, disturbance)
+        if abs(before - cost) < _SETTLED:
+            break
+        before = cost
     at = led.at(vehicle, disturbance)
     path = Trajectory.of(vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     gram, _ = products(disturbance, at.followed.system, at.base, at.prior)
@@ -162,12 +169,17 @@ class _Led:
         prior = pulled.T @ pulled + jnp.diag(untold)
         return _At(followed, followed.residual + scaled, prior, np.asarray(length))
 
-    def descend(self, vehicle: AbstractVehicle, disturbance: Disturbance, steps: int) -> AbstractVehicle:
-        """So many scoring steps, halved where they do not make the recordings more probable."""
+    def cost(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> float:
+        """Minus the log restricted likelihood."""
+        at = self.at(vehicle, disturbance)
+        return float(_restricted(disturbance, at.followed.system, at.base, at.prior))
+
+    def descend(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> AbstractVehicle:
+        """A few scoring steps, halved where they do not make the recordings more probable."""
         rows = vehicle.layout.free
         here = np.array([float(vehicle.values()[row.name]) for row in rows])
         step, before = np.zeros_like(here), np.inf
-        for _ in range(steps + 1):
+        for _ in range(_STEPS + 1):
             inside = np.clip(here + step, [row.lower for row in rows], [row.upper for row in rows])
             trial = vehicle.with_values({row.name: jnp.asarray(v) for row, v in zip(rows, inside, strict=True)})
             at = self.at(trial, disturbance)
@@ -191,11 +203,21 @@ def lengths(disturbance: Disturbance, system: System, columns: Columns) -> Float
 
 def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndarray, "r k n"]]:
     """The force (N, N m) that the recordings ask for beyond the model given all samples, and its standard deviation."""
+    mean, spread = smoothed(view.disturbance, view.followed.system, _left(view))
+    return np.asarray(mean), np.asarray(spread)
+
+
+def whiteness(view: View) -> float:
+    """How probable it is that innovations of the model and its disturbance are so correlated over time by chance."""
+    white, _ = whitened(view.disturbance, view.followed.system, _left(view))
+    return portmanteau(np.asarray(white)[..., 0], np.asarray(view.followed.system.measured))
+
+
+def _left(view: View) -> Columns:
+    """The residual, less what the free parameters take up of it."""
     weights = fitted(view.disturbance, view.followed.system, view.base, view.prior)
     assert view.base.forcing is not None
-    left = Columns((view.base.shown @ weights)[..., None], (view.base.forcing @ weights)[..., None])
-    mean, spread = smoothed(view.disturbance, view.followed.system, left)
-    return np.asarray(mean), np.asarray(spread)
+    return Columns((view.base.shown @ weights)[..., None], (view.base.forcing @ weights)[..., None])
 
 
 def facts(view: View) -> Facts:
