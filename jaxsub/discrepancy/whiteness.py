@@ -30,4 +30,4 @@ def portmanteau(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r
         terms[lag - 1] = np.sum(product, axis=(0, 1)) ** 2 / np.maximum(np.sum(product**2, axis=(0, 1)), 1e-300)
     windows = [lags for lags in _LAGS if lags <= longest]
     least = [special.chdtrc(lags, terms[:lags].sum(axis=0)) for lags in windows]
-    return min(1.0, float(np.min(least, initial=1.0)) * len(windows) * seen.shape[2])
+    return min(1.0, float(np.min(least)) * len(windows) * seen.shape[2]) if windows else 1.0

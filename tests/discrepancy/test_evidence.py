@@ -10,7 +10,7 @@ from scipy import stats
 
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.columns import candidate_columns
-from jaxsub.discrepancy.evidence import Evidence, Products
+from jaxsub.discrepancy.evidence import Evidence, Products, evidence_of
 from jaxsub.discrepancy.name import select
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.view import facts, look
@@ -112,3 +112,11 @@ def test_wrong_scale_of_the_noise_raises_no_alarm():
     chosen, _, p_values = select(Selector(Evidence.of(view, columns), tried, owners, {}), lambda message: None)
     assert chosen == [] and p_values[0] > 0.01
     assert jnp.isfinite(view.covariance).all()
+
+
+def test_a_view_is_the_same_from_wherever_its_disturbance_is_sought():
+    """Claim: a search from a disturbance a hundred times too large, as before a join, ends at the same evidence."""
+    fitted = fit(wrong(), batch(wrong(), recorded(CrossflowDrag("vertical", 5.0, 0.761, 0.3), 2)[:2]))
+    view = look(fitted)
+    far = dataclasses.replace(view.disturbance, force=100.0 * view.disturbance.force)
+    assert evidence_of(look(fitted, far)) == pytest.approx(evidence_of(view), abs=2.0)
