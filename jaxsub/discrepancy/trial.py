@@ -62,7 +62,7 @@ class Trial:
     progress: Progress
 
     def with_effects(self, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance) -> Model:
-        """A model with `effects` more, fitted again and tried; a search for its disturbance starts from that given."""
+        """A model with `effects` more, fitted again and tried; the `disturbance` is where one may look for its own."""
         make_room()
         self.progress(f"fitting with {', '.join(effect.label for effect in effects)}")
         joined = join(model.view, model.fit, effects)
