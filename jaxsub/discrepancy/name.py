@@ -81,9 +81,7 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
         scans.append(scan)
         best = selector.foremost(chosen, scan)
         gain = scan.value[best] - selector.value(chosen)
-        p_values.append(
-            selector.p_value(float(scan.statistic[best]), len(selector.owners[best])) if np.isfinite(gain) else 1.0
-        )
+        p_values.append(selector.p_value(best, scan) if np.isfinite(gain) else 1.0)
         if not gain > 0.0 or p_values[-1] >= SIGNIFICANCE or len(chosen) == MOST_EFFECTS:
             return chosen, scans, p_values
         if not selector.predicts(chosen, best):
@@ -182,7 +180,7 @@ def table(selector: Selector, scan: Scan) -> list[Candidate]:
         effect, columns, statistic = scan.effects[i], len(selector.owners[i]), float(scan.statistic[i])
         symbols = effect.symbols()
         predicted = {symbols[field]: value for field, value in numbers(effect).items()}
-        p_value = selector.p_value(statistic, columns)
+        p_value = selector.p_value(int(i), scan)
         kept = float(selector.kept[i]) if selector.usable[i] else 0.0
         said = _outcome(bool(selector.usable[i]), bool(scan.right[i]), p_value)
         line = Candidate(effect.name, effect.label, statistic, columns, p_value, predicted, kept, said)

@@ -66,9 +66,11 @@ class Selector:
         forms = collections.Counter(effect.name for effect in self.candidates)
         # every name is as probable as any other before the data, and within a name every form
         self.prior = -np.log([looked_at.get(effect.name, forms[effect.name]) for effect in self.candidates])
-        # forms on the grid of one effect are one trial
-        listed = {(effect.label, *effect.symbols()) for effect in self.candidates if effect.name not in looked_at}
-        self.tried = len(listed) + sum(looked_at.values())
+        # forms on the grid of one effect are one trial; where they were chosen among more, each of those has its share
+        listed = {(effect.label, *effect.symbols()) for effect in self.candidates}
+        labels = collections.Counter(effect.name for effect in {e.label: e for e in self.candidates}.values())
+        among = [looked_at.get(effect.name, 0) / labels[effect.name] for effect in self.candidates]
+        self.tried = len(listed) * np.maximum(among, 1.0)
 
     def columns(self, chosen: Sequence[int]) -> list[int]:
         """The columns of candidates."""
@@ -120,7 +122,7 @@ class Selector:
         share = self.free.explained(self.columns(chosen), self.owners)
         if share[best] > _LITTLE:
             return best
-        p_values = [self.p_value(x, len(own)) for x, own in zip(scan.statistic, self.owners, strict=True)]
+        p_values = [self.p_value(i, scan) for i in range(len(self.candidates))]
         asked = (scan.value > self.value(chosen)) & (np.array(p_values) < SIGNIFICANCE) & (share > _MUCH)
         if not np.any(asked):
             return best
@@ -154,9 +156,9 @@ class Selector:
         with_it = self.evidence.best(after)[1].predicted(after)
         return with_it > self.evidence.best(before)[1].predicted(before)
 
-    def p_value(self, statistic: float, columns: int) -> float:
-        """Of χ² with so many columns, corrected for all candidates tried."""
-        return min(1.0, self.tried * float(special.chdtrc(columns, statistic)))
+    def p_value(self, index: int, scan: Scan) -> float:
+        """Of a candidate's χ², corrected for all that were tried."""
+        return min(1.0, float(self.tried[index] * special.chdtrc(len(self.owners[index]), scan.statistic[index])))
 
 
 def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:

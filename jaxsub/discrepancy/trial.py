@@ -118,9 +118,9 @@ class Tries:
 
 
 def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
-    """What stands of `chosen` when all are tried at once, each as the best of its twins, and each is left out in turn.
+    """All of `chosen`, each as the best of its twins, where none of them can be left out; else nothing.
 
-    With one of two alone the coefficients take up the other. Nothing where all together do not stand.
+    With one of two alone the coefficients take up the other.
     """
     kept: dict[int, Fits] = {}
     for place, index in enumerate(chosen):
@@ -128,10 +128,8 @@ def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
         kept[fits[0][0]] = fits
     if not tries.gain([], [*kept]).helps:
         return {}
-    for index in reversed([*kept]):
-        if not tries.helps([i for i in kept if i != index], index):
-            del kept[index]
-    return kept
+    stand = all(tries.helps([i for i in kept if i != index], index) for index in reversed([*kept]))
+    return kept if stand else {}
 
 
 def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
@@ -145,7 +143,7 @@ def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
 def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
     """The model with those of `chosen` that stand on the held-out runs, and what is then to be said.
 
-    All together, or what stands of them so, or else the best that stands alone: where the model errs much, a linear
+    All together, or else the best that stands alone: where the model errs much, a linear
     picture adds effects that only make up for each other, and one of them put into the model shows what is left.
     """
     tries, effects = Tries(trial, base, found), found.selector.candidates
