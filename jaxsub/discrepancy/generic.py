@@ -86,7 +86,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], disturbances: list
     own = chosen.picked(columns)
     evidence = Evidence.of(view, own + hats, disturbances)
     held = list(range(len(columns)))
-    owners = [list(range(len(columns) + KNOTS * i, len(columns) + KNOTS * (i + 1))) for i in range(len(forces))]
+    owners = _owners(forces, len(columns))
     products = evidence.best(held)[1]
     gains = products.gains(held, owners)
     best = int(np.argmax(gains.statistic))
@@ -106,7 +106,12 @@ def most_explained(view: View, disturbance: Disturbance) -> float:
     if not forces:
         return 0.0
     products = Evidence.of(view, _all_hats(view, forces), [disturbance]).products[0]
-    return float(np.max(products.explained([], [range(KNOTS * i, KNOTS * (i + 1)) for i in range(len(forces))])))
+    return float(np.max(products.explained([], _owners(forces, 0))))
+
+
+def _owners(forces: Sequence[SmoothForce], first: int) -> list[list[int]]:
+    """The columns of each force's hats, which begin after the `first`."""
+    return [list(range(first + KNOTS * i, first + KNOTS * (i + 1))) for i in range(len(forces))]
 
 
 def _all_hats(view: View, forces: Sequence[SmoothForce]) -> Columns:

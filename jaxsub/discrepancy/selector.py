@@ -113,13 +113,17 @@ class Selector:
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
 
+    def of_free_run(self, chosen: Sequence[int]) -> np.ndarray:
+        """(m,) the share of what `chosen` leave of a free run's errors that each candidate explains."""
+        return self.free.explained(self.columns(chosen), self.owners)
+
     def foremost(self, chosen: Sequence[int], scan: Scan) -> int:
         """Which candidate to take next: the most probable, unless a free run asks for another and hardly for it.
 
         What happens within a few samples is told by very many of them, and may be of no importance later.
         """
         best = int(np.argmax(scan.value))
-        share = self.free.explained(self.columns(chosen), self.owners)
+        share = self.of_free_run(chosen)
         if share[best] > _LITTLE:
             return best
         p_values = [self.p_value(i, scan) for i in range(len(self.candidates))]
@@ -133,7 +137,7 @@ class Selector:
     def ruling(self, chosen: Sequence[int]) -> int | None:
         """Which of `chosen` alone explains most of a free run's errors, where they are much larger than the noise."""
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
-        share = self.free.explained([], self.owners)
+        share = self.of_free_run([])
         best = max(chosen, key=lambda i: share[i], default=None)
         large = self.free.gram[0, 0] > _LARGE * noise * self.free.samples
         return best if best is not None and large and share[best] > _MUCH else None
@@ -145,7 +149,7 @@ class Selector:
         """
         if index not in self.freely:
             return np.ones(len(self.candidates), bool)
-        left = 1.0 - self.free.explained(self.columns(chosen), self.owners)
+        left = 1.0 - self.of_free_run(chosen)
         return left <= _NO_MORE * left[index]
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:

@@ -166,12 +166,12 @@ def worth_trying(found: Found, judged: Judged) -> list[int]:
     numbers = [one.number for one in found.naming.named]
     if judged.named:
         return numbers
-    ruling = found.selector.ruling(numbers)
+    selector = found.selector
+    ruling = selector.ruling(numbers)
     if ruling is None:
         return []
-    free = found.selector.free
-    left = 1.0 - free.explained([], found.selector.owners)[ruling]
-    return [ruling] if left < _MUCH_LESS * (1.0 - most_explained(found.view, free.disturbance)) else []
+    left = 1.0 - selector.of_free_run([])[ruling]
+    return [ruling] if left < _MUCH_LESS * (1.0 - most_explained(found.view, selector.free.disturbance)) else []
 
 
 def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:

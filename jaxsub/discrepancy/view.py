@@ -109,25 +109,22 @@ def look(fit: Fit, disturbance: Disturbance | None = None) -> View:
     a fit that explains more, it is far too large, and numbers that are moved under it are lost.
     """
     led = _Led(fit, fit.problem)
-    vehicle = fit.vehicle
     system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     starts = [guess] if disturbance is None else [guess, disturbance]
-    disturbance = min(starts, key=lambda start: led.cost(vehicle, start))
+    at = min((led.at(fit.vehicle, start) for start in starts), key=lambda at: at.cost)
     before = np.inf
-    for turn in range(_TURNS):
-        at, steps = led.at(vehicle, disturbance), FROM_NEAR if turn else FROM_AFAR
-        disturbance = estimate_disturbance(at.followed.system, at.base, at.prior, disturbance, steps)
-        vehicle = led.descend(vehicle, disturbance)
-        cost = led.cost(vehicle, disturbance)
+    for steps in (FROM_AFAR, *[FROM_NEAR] * (_TURNS - 1)):
+        found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance, steps)
+        at = led.descend(at.vehicle, found)
+        cost = at.cost
         if abs(before - cost) < _SETTLED:
             break
         before = cost
-    at = led.at(vehicle, disturbance)
-    path = Trajectory.of(vehicle, fit.runs, at.followed.expected, at.followed.filtered)
-    gram, _ = products(disturbance, at.followed.system, at.base, at.prior)
+    path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
+    gram, _ = products(at.disturbance, at.followed.system, at.base, at.prior)
     covariance = np.linalg.inv(np.asarray(gram)[1:, 1:]) / np.outer(at.length, at.length)
-    return View(vehicle, covariance, fit.runs, fit.sigma, at.followed, disturbance, path, at.base, at.prior)
+    return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
 def _white(fit: Fit) -> Array:
@@ -141,12 +138,19 @@ def _white(fit: Fit) -> Array:
 
 
 class _At(NamedTuple):
-    """The runs followed by a vehicle, its columns of unit length, their priors, and the lengths."""
+    """The runs followed by a vehicle under a disturbance, its columns of unit length, their priors, and the lengths."""
 
+    vehicle: AbstractVehicle
+    disturbance: Disturbance
     followed: Followed
     base: Columns
     prior: Array
     length: np.ndarray
+
+    @property
+    def cost(self) -> float:
+        """Minus the log restricted likelihood."""
+        return float(_restricted(self.disturbance, self.followed.system, self.base, self.prior))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,18 +171,13 @@ class _Led:
         pulled = jnp.column_stack([away, jnp.diag(1.0 / length)]) / problem.prior_std[:, None]
         untold = jnp.full(len(fit.names) + 1, _UNTOLD).at[0].set(0.0)
         prior = pulled.T @ pulled + jnp.diag(untold)
-        return _At(followed, followed.residual + scaled, prior, np.asarray(length))
+        return _At(vehicle, disturbance, followed, followed.residual + scaled, prior, np.asarray(length))
 
-    def cost(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> float:
-        """Minus the log restricted likelihood."""
-        at = self.at(vehicle, disturbance)
-        return float(_restricted(disturbance, at.followed.system, at.base, at.prior))
-
-    def descend(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> AbstractVehicle:
-        """A few scoring steps, halved where they do not make the recordings more probable."""
+    def descend(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> _At:
+        """Where a few scoring steps lead, halved where they do not make the recordings more probable."""
         rows = vehicle.layout.free
         here = np.array([float(vehicle.values()[row.name]) for row in rows])
-        step, before = np.zeros_like(here), np.inf
+        step, before, best = np.zeros_like(here), np.inf, None
         for _ in range(_STEPS + 1):
             inside = np.clip(here + step, [row.lower for row in rows], [row.upper for row in rows])
             trial = vehicle.with_values({row.name: jnp.asarray(v) for row, v in zip(rows, inside, strict=True)})
@@ -188,10 +187,10 @@ class _Led:
             if not cost < before:
                 step = 0.5 * step
                 continue
-            vehicle, here, before = trial, inside, cost
+            best, here, before = at, inside, cost
             whole = np.asarray(gram)
             step = np.linalg.solve(whole[1:, 1:], whole[1:, 0]) / at.length
-        return vehicle
+        return self.at(vehicle, disturbance) if best is None else best
 
 
 @eqx.filter_jit

@@ -19,7 +19,7 @@ from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
 from ..recording.runs import Runs
-from .innovation_products import Steps, innovation_products, passes, products_by_part
+from .innovation_products import Steps, beyond, innovation_products, passes, products_by_part
 from .sensitivity import Jacobians, Linearised, propagate
 
 
@@ -149,11 +149,9 @@ def part_products(
 def steps(disturbance: Disturbance, system: System, columns: Columns) -> tuple[Steps, Float[Array, "z z"]]:
     """What a filter of the disturbed system needs at each sample, and the covariance of [x, d] that it begins with."""
     F, B = transition(disturbance, system)
-    # a step after the last sample, so that one loop serves all; it leads nowhere
-    last = lambda M: jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
     noise = jnp.where(system.measured, disturbance.noise, 1.0) ** 2
     begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
-    return Steps(last(F), last(B), system.C, noise, columns.shown, columns.forcing), begin
+    return Steps(beyond(F), beyond(B), system.C, noise, columns.shown, columns.forcing), begin
 
 
 def transition(disturbance: Disturbance, system: System) -> tuple[Float[Array, "r k1 z z"], Float[Array, "r k1 z n"]]:
@@ -238,6 +236,5 @@ def smoothed(
         nothing = jnp.zeros(s + n), jnp.zeros((s + n, s + n))
         return jax.lax.scan(back, nothing, kept, reverse=True)[1]
 
-    last = lambda M: jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
     assert column.forcing is not None
-    return jax.vmap(run)(last(F), last(B), C, noise, column.shown, last(column.forcing))
+    return jax.vmap(run)(beyond(F), beyond(B), C, noise, column.shown, beyond(column.forcing))

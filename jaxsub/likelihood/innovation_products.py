@@ -14,7 +14,7 @@ and P, X, C take their shares of these. Source: de Jong (1991), Ann. Statist. 19
 
 import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -72,9 +72,9 @@ def _met(carry: tuple[Array, Array], at: Steps) -> tuple[tuple[Array, Array], Pa
     return (at.F @ (P - half.T @ half) @ at.F.T + at.B @ at.B.T, after), Passed(white, factor, half, P, X)
 
 
-def _run(at: Steps, begin: Array, step: Callable) -> Any:
-    """`step` over the samples of one run."""
-    return jax.lax.scan(step, (begin, jnp.zeros((len(begin), at.shown.shape[-1]), at.shown.dtype)), at)[1]
+def beyond(M: Array) -> Array:
+    """With a step more after the last sample, so that one loop serves all; it leads nowhere."""
+    return jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
 
 
 def passes(steps: Steps, begin: Float[Array, "z z"], of: Callable[[Passed], T]) -> T:
@@ -84,10 +84,9 @@ def passes(steps: Steps, begin: Float[Array, "z z"], of: Callable[[Passed], T]) 
         carry, passed = _met(carry, at)
         return carry, of(passed)
 
-    # a step after the last sample, so that one loop serves all; it leads nowhere
-    beyond = lambda M: jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
+    nothing = jnp.zeros((len(begin), steps.shown.shape[-1]), steps.shown.dtype)
     whole = steps if steps.forcing is None else steps._replace(forcing=beyond(steps.forcing))
-    return jax.vmap(lambda at: _run(at, begin, step))(whole)
+    return jax.vmap(lambda at: jax.lax.scan(step, (begin, nothing), at)[1])(whole)
 
 
 def products_by_part(
