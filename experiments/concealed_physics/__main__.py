@@ -46,15 +46,19 @@ def main() -> None:
 
 def run(todo: list[Case], path: Path, jobs: int) -> None:
     """Append a line for each case of `todo` as soon as it is there."""
-    spawn = multiprocessing.get_context("spawn")
-    order = spawn.Value("i", 0)
-    own = {"initializer": on_own_core, "initargs": (order,)} if jobs > 1 else {}
-    with ProcessPoolExecutor(jobs, mp_context=spawn, max_tasks_per_child=_CASES_A_PROCESS, **own) as pool:
-        for number, future in enumerate(as_completed([pool.submit(work, case) for case in todo]), 1):
-            line = future.result()
-            with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(line) + "\n")
-            session.console.print(f"{number}/{len(todo)} {said(line)}", highlight=False, markup=False, soft_wrap=True)
+    spawn, number, batch = multiprocessing.get_context("spawn"), 0, _CASES_A_PROCESS * jobs
+    for first in range(0, len(todo), batch):
+        # a pool for each few cases: one that replaces its processes (max_tasks_per_child) can hang, CPython gh-115634
+        order = spawn.Value("i", 0)
+        own = {"initializer": on_own_core, "initargs": (order,)} if jobs > 1 else {}
+        with ProcessPoolExecutor(jobs, mp_context=spawn, **own) as pool:
+            for future in as_completed([pool.submit(work, case) for case in todo[first : first + batch]]):
+                line, number = future.result(), number + 1
+                with path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(line) + "\n")
+                session.console.print(
+                    f"{number}/{len(todo)} {said(line)}", highlight=False, markup=False, soft_wrap=True
+                )
 
 
 def said(line: dict) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from ..effects import AbstractEffect, candidates, looked_at
 from ..errors import InputError
 from ..estimate import Fit, fit
-from ..likelihood import Disturbance
+from ..likelihood import whitened
 from ..recording import Recording
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
@@ -19,7 +19,7 @@ from .evidence import Evidence
 from .generic import pattern
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
-from .name import MOST_EFFECTS, Named, name
+from .name import MOST_EFFECTS, Named, Naming, name
 from .process_noise import noise_note, noise_signals
 from .programs import make_room
 from .progress import Progress
@@ -27,7 +27,8 @@ from .selector import Selector
 from .show import channel_quality, coefficients, estimates, overlays, run_quality
 from .trial import Found, Model, Trial, tried, unnamed, worth_trying
 from .verdict import NOTHING, Judged, both, judge, summary
-from .view import View, facts, look, whiteness
+from .view import View, facts, look
+from .whiteness import RANDOM, Memory, memory
 
 # that a next manoeuvre is to tell from what was named
 _RIVALS = 2
@@ -74,7 +75,7 @@ def explained(
     """
     best, judged = baseline, NOTHING
     while True:
-        said = judge(found.naming, found.pattern, found.white)
+        said = judge(found.naming, found.pattern, found.memory)
         chosen = worth_trying(found, said)
         if chosen:
             best, said = tried(trial, best, found, chosen, said)
@@ -143,10 +144,19 @@ def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, pro
     selector = Selector(evidence, listed, owners, looked_at(known, vocabulary))
     naming = name(selector, progress)
     if naming.again:
-        return Found(view, selector, naming, None, 1.0)
+        return Found(view, selector, naming, None, RANDOM)
     progress("looking for forces without a name")
-    asked: list[Disturbance] = [evidence.best([])[1].disturbance, naming.products.disturbance]
-    return Found(view, selector, naming, pattern(view, evidence, naming.columns, asked), whiteness(view))
+    bare = evidence.best([])[1]
+    under = [naming.products] if naming.products is bare else [bare, naming.products]
+    return Found(view, selector, naming, pattern(view, evidence, naming.columns, under), _memory(evidence, naming))
+
+
+def _memory(evidence: Evidence, naming: Naming) -> Memory:
+    """Whether what the named leave is random."""
+    products, system = naming.products, evidence.view.followed.system
+    white, _ = whitened(products.disturbance, system, evidence.left(naming.columns, products))
+    gain = 2.0 * (naming.value - evidence.best([])[0])
+    return memory(np.asarray(white)[..., 0], np.asarray(system.measured), gain)
 
 
 def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:

@@ -90,6 +90,26 @@ class Products:
             sizes.append(amplitude)
         return Gains(np.array(evidence), np.array(statistic), sizes)
 
+    def remaining(self, chosen: Sequence[int], more: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+        """Products of the candidate columns `more` and theirs with the residual, less what `chosen` take up."""
+        left, at = self._left(chosen), [1 + c for c in more]
+        return left[np.ix_(at, at)], left[at, 0]
+
+    def mixed(self, chosen: Sequence[int], more: Sequence[int], weights: np.ndarray) -> "Products":
+        """With the candidate columns `chosen` and sums of `more`, their `weights` (len(more), m), for candidates."""
+        kept = [*range(self.known), *(self.known + c for c in chosen)]
+        whole = np.zeros((len(self.gram), len(kept) + weights.shape[1]))
+        whole[kept, range(len(kept))] = 1.0
+        whole[[self.known + c for c in more], len(kept) :] = weights
+        gram, parts = whole.T @ self.gram @ whole, whole.T @ self.parts @ whole
+        return dataclasses.replace(self, gram=gram, parts=parts)
+
+    def weights(self, chosen: Sequence[int]) -> np.ndarray:
+        """(1 + p + q,) of the columns whose sum is the residual less what parameters and `chosen` take up of it."""
+        index, found = self._index(chosen), np.zeros(len(self.gram))
+        found[0], found[index] = 1.0, -np.linalg.solve(self._block(self.gram, chosen), self.gram[index, 0])
+        return found
+
     def fall(self, chosen: Sequence[int]) -> float:
         """By how much χ² falls with the candidate columns `chosen`."""
         squares = lambda at: float(self.gram[at, 0] @ np.linalg.lstsq(self.gram[np.ix_(at, at)], self.gram[at, 0])[0])
@@ -169,6 +189,10 @@ class Evidence:
         prior = jax.scipy.linalg.block_diag(self.view.prior, jnp.diag(worth))
         found = estimate_disturbance(self.view.followed.system, self.view.base + picked, prior, start, FROM_NEAR)
         return self.under(found)
+
+    def left(self, chosen: Sequence[int], products: Products) -> Columns:
+        """The residual, less what free parameters and `chosen` take up of it according to `products`."""
+        return jax.tree.map(lambda column: (column @ products.weights(chosen))[..., None], self.whole)
 
     def picked(self, chosen: Sequence[int]) -> Columns:
         """Some of the candidates' columns."""

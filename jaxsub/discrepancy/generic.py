@@ -1,4 +1,8 @@
-"""Is a force left that the motion predicts, whatever its name? A smooth one of each variable in each equation."""
+"""Is a force left that the motion predicts, whatever its name? A smooth one of each variable in each equation.
+
+All are sought in the force that the recordings ask for and that passes for random; the few of each equation whose
+variable tells most of it elsewhere are then weighed by what they add to the evidence.
+"""
 
 import dataclasses
 import itertools
@@ -8,15 +12,24 @@ import numpy as np
 from scipy import special
 
 from ..effects import KNOTS, SmoothForce, variables, with_numbers
-from ..likelihood import Columns, Disturbance
+from ..likelihood import Disturbance, smoothed
 from .columns import force_columns
-from .evidence import Evidence
+from .evidence import Evidence, Products
 from .selector import SIGNIFICANCE
+from .smoothness import FINE, SCALES, coarse, smoothest
 from .view import View
 
 # places of the body, with which no force that is worth a description grows
 _LEFT_OUT = ("x", "y")
 _STILL = 1e-9
+# variables of an equation that are weighed; knots for choosing them, samples of nothing that each begins with, and
+# pieces of a run, each predicted from the others
+_WEIGHED, _CHOOSING, _NOTHING, _PIECES = 3, 2 * (KNOTS - 1) + 1, 0.5, 4
+# of a disturbance, part or most of which may be this force
+_SHARES = (1.0, 0.1, 0.01)
+# of what a smooth function tells, from which a force of few knots is near enough to stand for it
+_NEAR = 0.5
+_ROUNDING = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,13 +38,17 @@ class Pattern:
 
     **Fields**
 
-    - `force`: with its predicted numbers. `p_value`: that so much is luck, corrected for all tried; `predicts`: whether
-      it helps to predict parts of the recordings from the others.
-    - `alone`: log evidence with it and nothing else.
+    - `force`: with its predicted numbers; `heights`: (FINE,) its own, N or N m, at finer knots. `near`: the share of
+      what these tell that the force keeps.
+    - `p_value`: that so much is luck, corrected for all tried; `predicts`: whether it helps to predict parts of the
+      recordings from the others.
+    - `alone`: log evidence with it and nothing else, and how probable it is before the data.
     - `explained`: the share of what chosen effects and it explain together that the chosen ones explain alone.
     """
 
     force: SmoothForce
+    heights: np.ndarray
+    near: float
     p_value: float
     predicts: bool
     alone: float
@@ -43,17 +60,32 @@ class Pattern:
         return self.predicts and self.p_value < SIGNIFICANCE
 
     @property
+    def joins(self) -> bool:
+        """Whether the force is near enough to what is there to stand in a model."""
+        return self.significant and self.near > _NEAR
+
+    @property
     def described(self) -> str:
         """The shortest sum of at most two plain terms that is near it: a description and no name."""
-        x = np.linspace(self.force.low, self.force.high, KNOTS)
-        y = np.array([float(getattr(self.force, f"a_{j}")) for j in range(KNOTS)])
-        name = self.force.variable
-        terms = {"1": np.ones(KNOTS), name: x, f"{name}²": x**2, f"{name} |{name}|": x * np.abs(x), f"{name}³": x**3}
+        x, y, name = np.linspace(self.force.low, self.force.high, FINE), self.heights, self.force.variable
+        terms = {"1": np.ones(FINE), name: x, f"{name}²": x**2, f"{name} |{name}|": x * np.abs(x), f"{name}³": x**3}
+        turns = [_wave(2.0 * np.pi * periods / (x[-1] - x[0]), x, y) for periods in np.arange(1.0, FINE / 4, 0.25)]
+        kappa, phase, wave = min(turns, key=lambda turn: _fitted(turn[2][:, None], y)[1])
+        terms[f"sin({kappa:.3g} {name} {phase:+.2g})"] = wave
         chosen = [*itertools.combinations(terms, 1), *itertools.combinations(terms, 2)]
         fits = [(pick, *_fitted(np.stack([terms[t] for t in pick], axis=1), y)) for pick in chosen]
-        pick, weights, left = min(fits, key=lambda fit: KNOTS * np.log(fit[2] + 1e-12) + len(fit[0]) * np.log(KNOTS))
+        # a wave brings its place on two axes with it
+        count = lambda pick: len(pick) + 2 * sum(term.startswith("sin") for term in pick)
+        pick, weights, left = min(fits, key=lambda fit: KNOTS * np.log(fit[2] + 1e-12) + count(fit[0]) * np.log(KNOTS))
         said = " + ".join(f"{w:.3g} {t}" for w, t in zip(weights, pick, strict=True))
         return f"about {said}, which leaves {np.sqrt(left):.0%} of it"
+
+
+def _wave(kappa: float, x: np.ndarray, y: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """The wave number, the phase that follows `y` best, and the wave."""
+    (along, across), _ = _fitted(np.stack([np.sin(kappa * x), np.cos(kappa * x)], axis=1), y - y.mean())
+    phase = float(np.arctan2(across, along))
+    return float(kappa), phase, np.sin(kappa * x + phase)
 
 
 def _fitted(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
@@ -77,27 +109,118 @@ def smooth_forces(view: View) -> list[SmoothForce]:
     return found
 
 
-def pattern(view: View, chosen: Evidence, columns: list[int], disturbances: list[Disturbance]) -> Pattern | None:
-    """The force that recordings ask for most beyond the `columns` of what was `chosen`; None where nothing moves."""
+def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Products]) -> Pattern | None:
+    """The force that recordings ask for most beyond the `columns` of what was `chosen`; None where nothing moves.
+
+    Under shares of the disturbances of the products `under`, of which the last is that with what was chosen.
+    """
     forces = smooth_forces(view)
     if not forces:
         return None
-    hats = _all_hats(view, forces)
-    own = chosen.picked(columns)
-    evidence = Evidence.of(view, own + hats, disturbances)
-    held = list(range(len(columns)))
-    owners = _owners(forces, len(columns))
-    products = evidence.best(held)[1]
-    gains = products.gains(held, owners)
-    best = int(np.argmax(gains.statistic))
-    p_value = min(1.0, len(forces) * float(special.chdtrc(KNOTS, float(gains.statistic[best]))))
-    names = [f"a_{j}" for j in range(KNOTS)]
-    size = gains.amplitudes[best] / evidence.length[owners[best]]
-    force = with_numbers(forces[best], dict(zip(names, size.tolist(), strict=True)))
-    alone = max(p.log_evidence([]) + float(np.max(p.gains([], owners).evidence)) for p in evidence.products)
-    both = [*held, *owners[best]]
-    predicts = evidence.best(both)[1].predicted(both) > products.predicted(held)
-    return Pattern(force, p_value, predicts, alone, _explained(evidence, held, owners[best]))
+    left = chosen.left(columns, under[-1])
+    mean, _ = smoothed(under[-1].disturbance, view.followed.system, left)
+    weighed = _promising(view, forces, np.asarray(mean))
+    hats = force_columns(view, [column for force in weighed for column in _hats(view, force, FINE)])
+    asked = [dataclasses.replace(p.disturbance, force=share * p.disturbance.force) for p in under for share in _SHARES]
+    found = _Weighed(Evidence.of(view, chosen.picked(columns) + hats, asked), len(columns))
+    owners = _owners(weighed, len(columns), FINE)
+    values = [found.values(found.held, own) for own in owners]
+    best = int(np.argmax([np.max(each) for each in values]))
+    own, at, gain = owners[best], int(np.argmax(values[best])), np.max(values[best]) - found.before
+    trials = len(forces) * len(SCALES)
+    p_value = min(1.0, 0.5 * trials * float(special.chdtrc(1, 2.0 * max(0.0, float(gain)))))
+    # how large it is is a number of the force, as probable before the data as others; so is which force it is
+    alone = float(np.max(found.values([], own))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
+    heights, explained = found.heights(at, own)
+    force, near = found.nearest(at, own, weighed[best], heights)
+    return Pattern(force, heights, near, p_value, found.predicts(own), alone, explained)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Weighed:
+    """Evidence of the chosen columns, which are the first `count`, and of hats."""
+
+    evidence: Evidence
+    count: int
+
+    @property
+    def held(self) -> list[int]:
+        """The chosen columns."""
+        return list(range(self.count))
+
+    @property
+    def samples(self) -> int:
+        """How many."""
+        return self.evidence.products[0].samples
+
+    @property
+    def before(self) -> float:
+        """Log evidence of what was chosen."""
+        return self.evidence.best(self.held)[0]
+
+    def values(self, held: list[int], own: list[int]) -> np.ndarray:
+        """Log evidence with a force more than the columns `held`, under each disturbance."""
+        length = self.evidence.length[own]
+        return np.array([p.log_evidence(held) + smoothest(p, held, own, length).gain for p in self.evidence.products])
+
+    def together(self, products: Products, own: list[int]) -> tuple[Products, np.ndarray]:
+        """Products of what was chosen and of the columns of a force's prior, and what hats these are made of."""
+        weights = smoothest(products, self.held, own, self.evidence.length[own]).weights
+        return products.mixed(self.held, own, weights), weights
+
+    def predicts(self, own: list[int]) -> bool:
+        """Whether parts of the recordings are better predicted with the force, each under what suits it."""
+        both = list(range(self.count + FINE))
+        products = self.evidence.products
+        with_it = max(self.together(p, own)[0].predicted(both) for p in products)
+        return with_it > max(p.predicted(self.held) for p in products)
+
+    def heights(self, at: int, own: list[int]) -> tuple[np.ndarray, float]:
+        """Of the force, and the share of what it and the chosen explain that the chosen explain alone."""
+        both, weights = self.together(self.evidence.products[at], own)
+        more = list(range(self.count, self.count + FINE))
+        gains = both.gains(self.held, [more])
+        fall = both.fall(self.held)
+        explained = fall / max(fall + float(gains.statistic[0]), 1e-300)
+        return weights @ gains.amplitudes[0] / self.evidence.length[own], float(np.clip(explained, 0.0, 1.0))
+
+    def nearest(self, at: int, own: list[int], force: SmoothForce, heights: np.ndarray) -> tuple[SmoothForce, float]:
+        """The force with the numbers that are nearest to `heights` along the motion, and how near they are."""
+        G, _ = self.evidence.products[at].remaining(self.held, own)
+        G = G * np.outer(self.evidence.length[own], self.evidence.length[own])
+        C, told = coarse(), float(heights @ G @ heights)
+        # knots where nothing moved follow their neighbours' heights
+        G = G + _ROUNDING * float(np.trace(G)) * np.eye(FINE)
+        few = np.linalg.solve(C.T @ G @ C, C.T @ G @ heights)
+        lost = float((heights - C @ few) @ G @ (heights - C @ few))
+        numbers = {f"a_{j}": float(a) for j, a in enumerate(few)}
+        return with_numbers(force, numbers), 1.0 - lost / max(told, 1e-300)
+
+
+def _promising(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) -> list[SmoothForce]:
+    """Of each equation's forces those that tell most of the `missing` force (R, K, n) in parts they were not told."""
+    equations = view.vehicle.layout.equations
+    told = {}
+    for force in {force.variable: force for force in forces}.values():
+        told[force.variable] = dict(zip(equations, _told(view, force, missing), strict=True))
+    chosen: list[SmoothForce] = []
+    for equation in equations:
+        own = [force for force in forces if force.equation == equation]
+        chosen += sorted(own, key=lambda force: -told[force.variable][force.equation])[:_WEIGHED]
+    return chosen
+
+
+def _told(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
+    """(n,) share of each equation's missing force that the force's variable tells in pieces by the other pieces."""
+    hats, live = _shapes(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
+    pieces = [(r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), _PIECES)]
+    H, y = [hats[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
+    G = np.array([h.T @ h for h in H])
+    b, squares = np.array([h.T @ v for h, v in zip(H, y, strict=True)]), np.array([np.sum(v**2, axis=0) for v in y])
+    others = G.sum(axis=0) - G + _NOTHING * np.eye(_CHOOSING)
+    w = np.linalg.solve(others, b.sum(axis=0) - b)
+    left = squares - 2.0 * np.sum(w * b, axis=1) + np.sum(w * (G @ w), axis=1)
+    return 1.0 - left.sum(axis=0) / np.maximum(squares.sum(axis=0), 1e-300)
 
 
 def most_explained(view: View, disturbance: Disturbance) -> float:
@@ -105,31 +228,31 @@ def most_explained(view: View, disturbance: Disturbance) -> float:
     forces = smooth_forces(view)
     if not forces:
         return 0.0
-    products = Evidence.of(view, _all_hats(view, forces), [disturbance]).products[0]
-    return float(np.max(products.explained([], _owners(forces, 0))))
+    hats = force_columns(view, [column for force in forces for column in _hats(view, force, KNOTS)])
+    products = Evidence.of(view, hats, [disturbance]).products[0]
+    return float(np.max(products.explained([], _owners(forces, 0, KNOTS))))
 
 
-def _owners(forces: Sequence[SmoothForce], first: int) -> list[list[int]]:
+def _owners(forces: Sequence[SmoothForce], first: int, knots: int) -> list[list[int]]:
     """The columns of each force's hats, which begin after the `first`."""
-    return [list(range(first + KNOTS * i, first + KNOTS * (i + 1))) for i in range(len(forces))]
+    return [list(range(first + knots * i, first + knots * (i + 1))) for i in range(len(forces))]
 
 
-def _all_hats(view: View, forces: Sequence[SmoothForce]) -> Columns:
-    return force_columns(view, [column for force in forces for column in _hats(view, force)])
-
-
-def _explained(evidence: Evidence, held: list[int], more: list[int]) -> float:
-    """How much of the fall of χ² with both comes with the chosen alone, under the disturbance that suits both."""
-    products = evidence.best([*held, *more])[1]
-    whole = products.fall([*held, *more])
-    return float(np.clip(products.fall(held) / whole, 0.0, 1.0)) if whole > 0.0 else 1.0
-
-
-def _hats(view: View, force: SmoothForce) -> list[np.ndarray]:
+def _hats(view: View, force: SmoothForce, knots: int) -> list[np.ndarray]:
     """The force of each of its hats at both ends of each interval, (2, R, K-1, n)."""
     equations = view.vehicle.layout.equations
     own = np.eye(len(equations))[equations.index(force.equation)]
+    shapes = _shapes(_place(view, force), knots)
+    return [shapes[..., j, None] * own for j in range(knots)]
+
+
+def _shapes(place: np.ndarray, knots: int) -> np.ndarray:
+    """(..., knots) hats at equidistant knots, `place` being 0 at the first and 1 at the last."""
+    return np.maximum(0.0, 1.0 - np.abs(place[..., None] * (knots - 1) - np.arange(knots)))
+
+
+def _place(view: View, force: SmoothForce) -> np.ndarray:
+    """(2, R, K-1) where in its range the variable is at both ends of each interval, from 0 to 1."""
     shape = view.path.steps.shape
     ends = [np.broadcast_to(np.asarray(variables(m)[force.variable]), shape) for m in (view.path.start, view.path.end)]
-    place = np.clip((np.stack(ends) - force.low) / (force.high - force.low), 0.0, 1.0) * (KNOTS - 1)
-    return [np.maximum(0.0, 1.0 - np.abs(place - j))[..., None] * own for j in range(KNOTS)]
+    return np.clip((np.stack(ends) - force.low) / (force.high - force.low), 0.0, 1.0)

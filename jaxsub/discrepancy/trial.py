@@ -21,6 +21,7 @@ from .selector import Selector
 from .show import HeldOut, Luck, hold, luck
 from .verdict import Judged, helped, settled
 from .view import View, look
+from .whiteness import Memory
 
 # times the errors that a force without a name leaves in a free run
 _MUCH_LESS = 4.0
@@ -32,14 +33,14 @@ Fits = list[tuple[int, float]]
 class Found:
     """What the vocabulary says about the recordings from one view of them, and a force without a name, if asked.
 
-    `white` is the p-value of the view's innovations being white.
+    `memory` says whether what the named leave is random.
     """
 
     view: View
     selector: Selector
     naming: Naming
     pattern: Pattern | None
-    white: float
+    memory: Memory
 
 
 class Model(NamedTuple):
@@ -176,7 +177,7 @@ def worth_trying(found: Found, judged: Judged) -> list[int]:
 
 def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
     """The model with the force without a name, if it stands on the held-out runs."""
-    if found.pattern is None or not found.pattern.significant:
+    if found.pattern is None or not found.pattern.joins:
         return base, judged
     force = found.pattern.force
     more = trial.with_effects(base, [force], found.naming.products.disturbance)

@@ -8,6 +8,7 @@ from .diagnosis import Location, Physics, Verdict
 from .generic import Pattern
 from .name import Named, Naming
 from .show import Luck
+from .whiteness import Memory
 
 _CERTAIN = 0.9
 _EXPLAINED = 0.75
@@ -38,8 +39,8 @@ def both(earlier: Judged, later: Judged) -> Judged:
     return Judged(verdict, named, min(earlier.p_value, later.p_value), notes)
 
 
-def judge(naming: Naming, pattern: Pattern | None, white: float) -> Judged:
-    """The verdict before anything was tried on the held-out runs; `white` is the innovations' p-value of being so."""
+def judge(naming: Naming, pattern: Pattern | None, memory: Memory) -> Judged:
+    """The verdict before anything was tried on the held-out runs."""
     follows = pattern is not None and pattern.significant
     # a scan that no choice followed was either not significant or predicted nothing
     least = naming.first_p if naming.named or pattern is None or not follows else min(naming.first_p, pattern.p_value)
@@ -47,9 +48,12 @@ def judge(naming: Naming, pattern: Pattern | None, white: float) -> Judged:
     notes: list[str] = []
     if pattern is not None and follows:
         notes.append(f"{pattern.force.expression} is asked for in {pattern.force.equation}: {pattern.described}.")
-    if not naming.named and white < _NOT_WHITE and not follows:
-        notes.append(f"What is left is not random: that its samples are so correlated by chance has p = {white:.2g}.")
-        return Judged("unknown", [], min(p_value, white), notes)
+    correlated = memory.p_value < _NOT_WHITE
+    if correlated:
+        chance = f"that its samples are so correlated by chance has p = {memory.p_value:.2g}"
+        notes.append(f"What is left is not random: {chance}.")
+    if not naming.named and correlated and not follows:
+        return Judged("unknown", [], min(p_value, memory.p_value), notes)
     if not naming.named:
         return Judged("unknown" if follows else "none", [], p_value, notes)
     labels = ", ".join(named.effect.label for named in naming.named)
@@ -58,6 +62,11 @@ def judge(naming: Naming, pattern: Pattern | None, white: float) -> Judged:
         return Judged("unknown", [], p_value, notes)
     if pattern is not None and follows and pattern.explained < _EXPLAINED:
         notes.append(f"{labels} would explain {pattern.explained:.0%} of the mismatch, too little for its cause.")
+        return Judged("unknown", [], p_value, notes)
+    if correlated and memory.explained < _EXPLAINED:
+        notes.append(
+            f"{labels} would explain {memory.explained:.0%} of it and of what is left, too little for its cause."
+        )
         return Judged("unknown", [], p_value, notes)
     return Judged(_certainty(naming.named), naming.named, p_value, notes)
 

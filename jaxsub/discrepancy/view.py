@@ -22,13 +22,12 @@ from ..likelihood import (
     products,
     restricted,
     smoothed,
-    whitened,
     whitened_squares,
 )
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .tones import tones
-from .whiteness import portmanteau, record_sigma
+from .whiteness import record_sigma
 
 _restricted = eqx.filter_jit(restricted)
 # scoring steps under one disturbance
@@ -204,12 +203,6 @@ def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndar
     """The force (N, N m) that the recordings ask for beyond the model given all samples, and its standard deviation."""
     mean, spread = smoothed(view.disturbance, view.followed.system, _left(view))
     return np.asarray(mean), np.asarray(spread)
-
-
-def whiteness(view: View) -> float:
-    """How probable it is that innovations of the model and its disturbance are so correlated over time by chance."""
-    white, _ = whitened(view.disturbance, view.followed.system, _left(view))
-    return portmanteau(np.asarray(white)[..., 0], np.asarray(view.followed.system.measured))
 
 
 def _left(view: View) -> Columns:

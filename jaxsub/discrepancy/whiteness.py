@@ -1,11 +1,37 @@
-"""The white part of residuals, and whether innovations are white."""
+"""The white part of residuals, whether innovations are white, and how much of them their past tells."""
+
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy import special
+from scipy import linalg, special
 
 # samples; each window is a test of its own
 _LAGS = (5, 20, 60)
+# samples from which the next is predicted
+_PAST = 20
+
+
+class Memory(NamedTuple):
+    """Whether innovations are random.
+
+    **Fields**
+
+    - `p_value`: how probable they are to be so correlated over time by chance.
+    - `explained`: the share that some effects have in what they explain and what the innovations' past would.
+    """
+
+    p_value: float
+    explained: float
+
+
+RANDOM = Memory(1.0, 1.0)
+
+
+def memory(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r k c"], gain: float) -> Memory:
+    """Of innovations that are left beside effects which `gain` so much χ²."""
+    told = remembered(white, measured)
+    return Memory(portmanteau(white, measured), max(gain, 0.0) / max(gain + told, 1e-300))
 
 
 def record_sigma(error: Float[np.ndarray, "r k c"], mask: np.ndarray) -> Float[np.ndarray, " c"]:
@@ -31,3 +57,19 @@ def portmanteau(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r
     windows = [lags for lags in _LAGS if lags <= longest]
     least = [special.chdtrc(lags, terms[:lags].sum(axis=0)) for lags in windows]
     return min(1.0, float(np.min(least)) * len(windows) * seen.shape[2]) if windows else 1.0
+
+
+def remembered(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r k c"]) -> float:
+    r"""By how much χ² would fall if each innovation were predicted from the last P of its channel, less chance's share.
+
+    $\sum_c \max(0,\ N \ln(\gamma_0/\sigma^2) - P)$, σ² what an autoregression by the covariances γ leaves.
+    Source: Yule and Walker; Box and Jenkins (1976), Time Series Analysis.
+    """
+    seen, past = np.where(measured, white, 0.0), min(_PAST, white.shape[1] // 4)
+    gamma = np.stack([np.sum(seen[:, lag:] * seen[:, : seen.shape[1] - lag], axis=(0, 1)) for lag in range(past + 1)])
+    falls = [0.0]
+    for own, count in zip(gamma.T, measured.sum(axis=(0, 1)), strict=True):
+        if past and own[0] > 0.0:
+            left = own[0] - own[1:] @ linalg.solve_toeplitz(own[:-1], own[1:])
+            falls.append(max(0.0, float(count * np.log(own[0] / max(left, 1e-300)) - past)))
+    return float(np.sum(falls))

@@ -1,0 +1,74 @@
+r"""A function of one variable of which nothing is known but that it is smooth, or how smooth.
+
+It is drawn through `FINE` knots whose heights have a Gaussian prior before the data, of covariance
+$s^2\exp(-\tfrac12(x_i-x_j)^2/\ell^2)$ with $\ell$ some share of the variable's range and $s$ where the evidence is
+largest. So what a smooth function gains and what it costs is that of the few shapes that the data tell, however many
+knots there are, and a function of many periods is found like one of a single bend. With the whitened products G of the
+knots' hats among themselves, b of theirs with the residual, and $L L^T$ the covariance for s = 1, the log evidence
+gained is
+
+$$\tfrac12 \sum_i \Bigl[\frac{s^2 c_i^2}{1 + s^2\lambda_i} - \ln(1 + s^2\lambda_i)\Bigr],\qquad
+L^T G L = U\lambda U^T,\; c = U^T L^T b.$$
+
+Twice that is, where there is no such function, half of the time zero and otherwise $\chi^2_1$, or less.
+Source: Rasmussen and Williams (2006), Gaussian Processes for Machine Learning; Self and Liang (1987), J. Am. Stat.
+Assoc. 82, on the likelihood ratio of a variance at its bound.
+"""
+
+import functools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..effects import KNOTS
+from .evidence import Products
+
+# three knots between any two of `SmoothForce`
+FINE = 4 * (KNOTS - 1) + 1
+# of the variable's range
+SCALES = (1 / 3, 1 / 10, 1 / 30)
+# s² in units of the one for which the best told shape has a prior as wide as its error
+_SIZES = np.geomspace(1e-2, 1e8, 61)
+_ROUNDING = 1e-8
+
+
+class Smooth(NamedTuple):
+    """What the likeliest smooth function gains in log evidence, and by which weights hats become columns of its prior.
+
+    The columns' amplitudes are independent before the data, and worth one sample. (FINE, FINE).
+    """
+
+    gain: float
+    weights: np.ndarray
+
+
+def smoothest(products: Products, chosen: Sequence[int], hats: Sequence[int], length: np.ndarray) -> Smooth:
+    """The likeliest smooth function on top of the candidates `chosen`, its `hats` being of these lengths."""
+    G, b = products.remaining(chosen, hats)
+    G, b = G * np.outer(length, length), b * length
+    best = Smooth(0.0, np.zeros_like(G))
+    for L in _roots():
+        values, U = np.linalg.eigh(L.T @ G @ L)
+        values, c = np.maximum(values, 0.0), U.T @ (L.T @ b)
+        sizes = _SIZES / max(float(values[-1]), 1e-300)
+        spread = sizes[:, None] * values
+        gains = 0.5 * np.sum(sizes[:, None] * c**2 / (1.0 + spread) - np.log1p(spread), axis=1)
+        i = int(np.argmax(gains))
+        if gains[i] > best.gain:
+            best = Smooth(float(gains[i]), length[:, None] * L * np.sqrt(sizes[i] / products.samples))
+    return best
+
+
+@functools.cache
+def _roots() -> list[np.ndarray]:
+    """A root of the covariance of the heights for each scale."""
+    apart = np.subtract.outer(np.arange(FINE), np.arange(FINE)) / (FINE - 1)
+    covariances = [np.exp(-0.5 * (apart / scale) ** 2) + _ROUNDING * np.eye(FINE) for scale in SCALES]
+    return [np.linalg.cholesky(covariance) for covariance in covariances]
+
+
+def coarse() -> np.ndarray:
+    """(FINE, KNOTS) the hats of `SmoothForce` in terms of the fine ones."""
+    place = np.arange(FINE)[:, None] / ((FINE - 1) / (KNOTS - 1))
+    return np.maximum(0.0, 1.0 - np.abs(place - np.arange(KNOTS)))
