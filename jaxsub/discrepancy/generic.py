@@ -11,20 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from ..effects import KNOTS, SmoothForce, variables, with_numbers
+from ..effects import KNOTS, SmoothForce, with_numbers
 from ..likelihood import Disturbance, smoothed
 from .columns import force_columns
 from .evidence import Evidence, Products
+from .hats import hats, promising, smooth_forces
 from .selector import SIGNIFICANCE
 from .smoothness import FINE, SCALES, coarse, smoothest
 from .view import View
 
-# places of the body, with which no force that is worth a description grows
-_LEFT_OUT = ("x", "y")
-_STILL = 1e-9
-# variables of an equation that are weighed; knots for choosing them, samples of nothing that each begins with, and
-# pieces of a run, each predicted from the others
-_WEIGHED, _CHOOSING, _NOTHING, _PIECES = 3, 2 * (KNOTS - 1) + 1, 0.5, 4
 # of a disturbance, part or most of which may be this force
 _SHARES = (1.0, 0.1, 0.01)
 # of what a smooth function tells, from which a force of few knots is near enough to stand for it
@@ -94,21 +89,6 @@ def _fitted(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
     return weights, float(np.sum((y - columns @ weights) ** 2) / max(np.sum(y**2), 1e-300))
 
 
-def smooth_forces(view: View) -> list[SmoothForce]:
-    """Every equation with every variable that moves."""
-    starts, ends = variables(view.path.start), variables(view.path.end)
-    live = view.path.steps > 0.0
-    found = []
-    for name in starts:
-        x = np.broadcast_to(np.asarray(starts[name]), live.shape)[live]
-        if name in _LEFT_OUT or name not in ends or not np.std(x) > _STILL:
-            continue
-        low, high = (float(f"{edge:.6g}") for edge in np.percentile(x, [1.0, 99.0]))
-        if high > low:
-            found += [SmoothForce(e, name, low, high) for e in view.vehicle.layout.equations]
-    return found
-
-
 def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Products]) -> Pattern | None:
     """The force that recordings ask for most beyond the `columns` of what was `chosen`; None where nothing moves.
 
@@ -119,10 +99,10 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
         return None
     left = chosen.left(columns, under[-1])
     mean, _ = smoothed(under[-1].disturbance, view.followed.system, left)
-    weighed = _promising(view, forces, np.asarray(mean))
-    hats = force_columns(view, [column for force in weighed for column in _hats(view, force, FINE)])
+    weighed = promising(view, forces, np.asarray(mean))
+    drawn = force_columns(view, [column for force in weighed for column in hats(view, force, FINE)])
     asked = [dataclasses.replace(p.disturbance, force=share * p.disturbance.force) for p in under for share in _SHARES]
-    found = _Weighed(Evidence.of(view, chosen.picked(columns) + hats, asked), len(columns))
+    found = _Weighed(Evidence.of(view, chosen.picked(columns) + drawn, asked), len(columns))
     owners = _owners(weighed, len(columns), FINE)
     values = [found.values(found.held, own) for own in owners]
     best = int(np.argmax([np.max(each) for each in values]))
@@ -197,62 +177,16 @@ class _Weighed:
         return with_numbers(force, numbers), 1.0 - lost / max(told, 1e-300)
 
 
-def _promising(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) -> list[SmoothForce]:
-    """Of each equation's forces those that tell most of the `missing` force (R, K, n) in parts they were not told."""
-    equations = view.vehicle.layout.equations
-    told = {}
-    for force in {force.variable: force for force in forces}.values():
-        told[force.variable] = dict(zip(equations, _told(view, force, missing), strict=True))
-    chosen: list[SmoothForce] = []
-    for equation in equations:
-        own = [force for force in forces if force.equation == equation]
-        chosen += sorted(own, key=lambda force: -told[force.variable][force.equation])[:_WEIGHED]
-    return chosen
-
-
-def _told(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
-    """(n,) share of each equation's missing force that the force's variable tells in pieces by the other pieces."""
-    hats, live = _shapes(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
-    pieces = [(r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), _PIECES)]
-    H, y = [hats[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
-    G = np.array([h.T @ h for h in H])
-    b, squares = np.array([h.T @ v for h, v in zip(H, y, strict=True)]), np.array([np.sum(v**2, axis=0) for v in y])
-    others = G.sum(axis=0) - G + _NOTHING * np.eye(_CHOOSING)
-    w = np.linalg.solve(others, b.sum(axis=0) - b)
-    left = squares - 2.0 * np.sum(w * b, axis=1) + np.sum(w * (G @ w), axis=1)
-    return 1.0 - left.sum(axis=0) / np.maximum(squares.sum(axis=0), 1e-300)
-
-
 def most_explained(view: View, disturbance: Disturbance) -> float:
     """The largest share of the errors under a `disturbance` that one smooth force alone explains."""
     forces = smooth_forces(view)
     if not forces:
         return 0.0
-    hats = force_columns(view, [column for force in forces for column in _hats(view, force, KNOTS)])
-    products = Evidence.of(view, hats, [disturbance]).products[0]
+    drawn = force_columns(view, [column for force in forces for column in hats(view, force, KNOTS)])
+    products = Evidence.of(view, drawn, [disturbance]).products[0]
     return float(np.max(products.explained([], _owners(forces, 0, KNOTS))))
 
 
 def _owners(forces: Sequence[SmoothForce], first: int, knots: int) -> list[list[int]]:
     """The columns of each force's hats, which begin after the `first`."""
     return [list(range(first + knots * i, first + knots * (i + 1))) for i in range(len(forces))]
-
-
-def _hats(view: View, force: SmoothForce, knots: int) -> list[np.ndarray]:
-    """The force of each of its hats at both ends of each interval, (2, R, K-1, n)."""
-    equations = view.vehicle.layout.equations
-    own = np.eye(len(equations))[equations.index(force.equation)]
-    shapes = _shapes(_place(view, force), knots)
-    return [shapes[..., j, None] * own for j in range(knots)]
-
-
-def _shapes(place: np.ndarray, knots: int) -> np.ndarray:
-    """(..., knots) hats at equidistant knots, `place` being 0 at the first and 1 at the last."""
-    return np.maximum(0.0, 1.0 - np.abs(place[..., None] * (knots - 1) - np.arange(knots)))
-
-
-def _place(view: View, force: SmoothForce) -> np.ndarray:
-    """(2, R, K-1) where in its range the variable is at both ends of each interval, from 0 to 1."""
-    shape = view.path.steps.shape
-    ends = [np.broadcast_to(np.asarray(variables(m)[force.variable]), shape) for m in (view.path.start, view.path.end)]
-    return np.clip((np.stack(ends) - force.low) / (force.high - force.low), 0.0, 1.0)

@@ -1,8 +1,9 @@
-"""Whether innovations are white: rarely denied where they are, and denied where their neighbours go together."""
+"""Whether innovations are white, rarely denied where they are, and what their past tells where they are not."""
 
 import numpy as np
+import pytest
 
-from jaxsub.discrepancy.whiteness import portmanteau
+from jaxsub.discrepancy.whiteness import memory, portmanteau, remembered
 
 
 def innovations(rho: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -32,3 +33,21 @@ def test_short_and_empty_records_say_nothing():
     white, measured = innovations(0.5, 1)
     assert portmanteau(white, np.zeros_like(measured)) == 1.0
     assert portmanteau(white[:, :8], measured[:, :8]) == 1.0
+
+
+def test_what_the_past_tells_is_that_of_the_correlation():
+    """Claim: χ² that the past takes is N ln 1/(1 - ρ²) of the correlated channel, and little of white ones."""
+    white, measured = innovations(0.4, 1)
+    everything = np.ones_like(measured)
+    expected = 800 * np.log(1.0 / (1.0 - 0.4**2))
+    assert abs(remembered(white, everything) - expected) < 0.35 * expected
+    assert remembered(*innovations(0.0, 1)) < 30.0
+
+
+def test_effects_that_explain_less_than_the_past_are_told_so():
+    """Claim: the share of an effect falls from one to a half as what the past tells grows to what the effect gains."""
+    white, measured = innovations(0.4, 2)
+    told = remembered(white, measured)
+    assert memory(white, measured, 99.0 * told).explained == pytest.approx(0.99)
+    assert memory(white, measured, told).explained == pytest.approx(0.5)
+    assert memory(white, measured, 0.0).explained == 0.0

@@ -1,0 +1,80 @@
+"""Forces that follow one variable of a motion, by hats, and which of them a force may be.
+
+A force that recordings ask for passes for random in a filter. The variable that it follows tells it in parts of the
+recordings from the others.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..effects import KNOTS, SmoothForce, variables
+from .view import View
+
+# places of the body, with which no force that is worth a description grows
+_LEFT_OUT = ("x", "y")
+_STILL = 1e-9
+# variables that are kept for an equation; knots for choosing them, samples of nothing that each knot begins with, and
+# pieces of a run, each told by the others
+_KEPT, _CHOOSING, _NOTHING, _PIECES = 3, 2 * (KNOTS - 1) + 1, 0.5, 4
+
+
+def smooth_forces(view: View) -> list[SmoothForce]:
+    """Every equation with every variable that moves."""
+    starts, ends = variables(view.path.start), variables(view.path.end)
+    live = view.path.steps > 0.0
+    found = []
+    for name in starts:
+        x = np.broadcast_to(np.asarray(starts[name]), live.shape)[live]
+        if name in _LEFT_OUT or name not in ends or not np.std(x) > _STILL:
+            continue
+        low, high = (float(f"{edge:.6g}") for edge in np.percentile(x, [1.0, 99.0]))
+        if high > low:
+            found += [SmoothForce(e, name, low, high) for e in view.vehicle.layout.equations]
+    return found
+
+
+def promising(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) -> list[SmoothForce]:
+    """Of each equation's forces those that tell most of the `missing` force (R, K, n) in parts they were not told."""
+    equations = view.vehicle.layout.equations
+    told = {}
+    for force in {force.variable: force for force in forces}.values():
+        told[force.variable] = dict(zip(equations, _told(view, force, missing), strict=True))
+    chosen: list[SmoothForce] = []
+    for equation in equations:
+        own = [force for force in forces if force.equation == equation]
+        chosen += sorted(own, key=lambda force: -told[force.variable][force.equation])[:_KEPT]
+    return chosen
+
+
+def _told(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
+    """(n,) share of each equation's missing force that the force's variable tells in pieces by the other pieces."""
+    shapes, live = _shapes(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
+    pieces = [(r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), _PIECES)]
+    H, y = [shapes[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
+    G = np.array([h.T @ h for h in H])
+    b, squares = np.array([h.T @ v for h, v in zip(H, y, strict=True)]), np.array([np.sum(v**2, axis=0) for v in y])
+    others = G.sum(axis=0) - G + _NOTHING * np.eye(_CHOOSING)
+    w = np.linalg.solve(others, b.sum(axis=0) - b)
+    left = squares - 2.0 * np.sum(w * b, axis=1) + np.sum(w * (G @ w), axis=1)
+    return 1.0 - left.sum(axis=0) / np.maximum(squares.sum(axis=0), 1e-300)
+
+
+def hats(view: View, force: SmoothForce, knots: int) -> list[np.ndarray]:
+    """The force of each of its hats at both ends of each interval, (2, R, K-1, n)."""
+    equations = view.vehicle.layout.equations
+    own = np.eye(len(equations))[equations.index(force.equation)]
+    shapes = _shapes(_place(view, force), knots)
+    return [shapes[..., j, None] * own for j in range(knots)]
+
+
+def _shapes(place: np.ndarray, knots: int) -> np.ndarray:
+    """(..., knots) hats at equidistant knots, `place` being 0 at the first and 1 at the last."""
+    return np.maximum(0.0, 1.0 - np.abs(place[..., None] * (knots - 1) - np.arange(knots)))
+
+
+def _place(view: View, force: SmoothForce) -> np.ndarray:
+    """(2, R, K-1) where in its range the variable is at both ends of each interval, from 0 to 1."""
+    shape = view.path.steps.shape
+    ends = [np.broadcast_to(np.asarray(variables(m)[force.variable]), shape) for m in (view.path.start, view.path.end)]
+    return np.clip((np.stack(ends) - force.low) / (force.high - force.low), 0.0, 1.0)
