@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import special
 
 from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
 from ..estimate import Fit, evaluate, search
@@ -13,6 +14,8 @@ from .view import View
 
 # a shape such as a lag at which its effect is gone
 _VANISHED = 1e-6
+# p-value of nothing from which an effect is not told
+_TOLD = 0.01
 
 
 def join(view: View, fit: Fit, effects: Sequence[AbstractEffect]) -> Fit:
@@ -49,6 +52,24 @@ def sound(fit: Fit, effects: Sequence[AbstractEffect]) -> bool:
     for effect in (e for e in fit.vehicle.effects if e.label in labels):
         found, linear = numbers(effect), amplitudes(effect)
         if not admissible(effect, found) or any(v <= _VANISHED for n, v in found.items() if n not in linear):
+            return False
+    return True
+
+
+def told(view: View, effects: Sequence[AbstractEffect]) -> bool:
+    r"""Whether the recordings tell each of `effects` from nothing, whatever all other numbers are.
+
+    By the Wald statistic $a^T P^{-1} a$ of its amplitudes, which is $\chi^2$ for nothing, or of the numbers of an
+    effect that has no amplitude.
+    """
+    names, values = [row.name for row in view.vehicle.layout.free], view.vehicle.values()
+    for effect in effects:
+        symbols = effect.symbols()
+        own = [f"{effect.label}.{symbols[name]}" for name in amplitudes(effect) or symbols]
+        at = [names.index(name) for name in own]
+        size = np.array([float(values[name]) for name in own])
+        wald = size @ np.linalg.solve(view.covariance[np.ix_(at, at)], size)
+        if not special.chdtrc(len(at), max(float(wald), 0.0)) < _TOLD:
             return False
     return True
 

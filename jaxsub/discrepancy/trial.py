@@ -13,7 +13,7 @@ from ..likelihood import Disturbance
 from ..recording.runs import Runs
 from .evidence import evidence_of
 from .generic import Pattern, most_explained
-from .model import join, sound
+from .model import join, sound, told
 from .name import Naming, named_on, refitted, standing
 from .programs import make_room
 from .progress import Progress
@@ -96,8 +96,9 @@ class Tries:
         return self.models[key]
 
     def sound(self, numbers: Sequence[int]) -> bool:
-        """Whether they came out of the fit as physics admits."""
-        return sound(self.model(numbers).fit, self.model(numbers).added)
+        """Whether they came out of the fit as physics admits, and the recordings tell each beside the others."""
+        model = self.model(numbers)
+        return sound(model.fit, model.added) and told(model.view, model.added)
 
     def helps(self, fewer: Sequence[int], more: int) -> bool:
         """Whether one more on top of `fewer` stands on the held-out runs; what was found is kept in `said`."""
@@ -109,7 +110,7 @@ class Tries:
         return luck(self.model(fewer).shown, self.model(more).shown, self.sound(more))
 
     def value(self, numbers: Sequence[int]) -> float:
-        """Log evidence of the fit with these; minus infinity where physics does not admit it."""
+        """Log evidence of the fit with these; minus infinity where they are not sound."""
         return evidence_of(self.model(numbers).view) if self.sound(numbers) else -np.inf
 
     def closest(self, others: Sequence[int], index: int) -> Fits:

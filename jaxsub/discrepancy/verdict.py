@@ -77,7 +77,9 @@ def helped(judged: Judged, effect: AbstractEffect, gain: Luck) -> Judged:
         said = f"With {effect.label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
         said += f"that this is luck has probability {gain.probability:.2g}."
         return dataclasses.replace(judged, notes=[*judged.notes, said])
-    why = "the held-out runs worse" if gain.sound else "with numbers that physics does not admit"
+    why = (
+        "the held-out runs worse" if gain.sound else "with numbers that physics does not admit or the runs do not tell"
+    )
     said = f"{effect.label} fitted the training runs better but {why}, and is not accepted."
     return dataclasses.replace(judged, notes=[*judged.notes, said])
 

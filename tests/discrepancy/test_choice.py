@@ -2,12 +2,18 @@
 
 import numpy as np
 import pytest
+from diagnosis_cases import recorded, wrong
 
 from experiments.next_manoeuvre.cases import case
-from jaxsub.discrepancy import diagnose
+from jaxsub.discrepancy import batch, diagnose
+from jaxsub.discrepancy.model import told
 from jaxsub.discrepancy.name import Named, refitted
+from jaxsub.discrepancy.view import look
+from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.mechanisms import CoulombFriction
+from jaxsub.effects.sensors import SensorScale
+from jaxsub.estimate import fit
 
 
 @pytest.mark.long
@@ -31,3 +37,13 @@ def test_probabilities_of_twins_are_those_of_their_fits_and_others_keep_theirs()
         {"cubic-damping": 0.2, "coulomb-friction": 0.2}
     )
     assert refitted(named, [(cubic, -1.0)]) == named
+
+
+def test_what_is_there_is_told_and_what_is_not_is_not():
+    """Claim: beside a sensor's scale error that was concealed, an asymmetry that was not is not told from nothing."""
+    scale, asymmetry = SensorScale("q", 0.02), HullAsymmetry("pitch", 0.1)
+    runs = batch(wrong(), recorded(SensorScale("q", 0.05), 1)[:2])
+    view = look(fit(wrong().with_effect(scale).with_effect(asymmetry), runs))
+    assert told(view, [scale])
+    assert not told(view, [asymmetry])
+    assert not told(view, [scale, asymmetry])
