@@ -92,12 +92,12 @@ class Products:
 
     def remaining(self, chosen: Sequence[int], more: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
         """Products of the candidate columns `more` and theirs with the residual, less what `chosen` take up."""
-        left, at = self._left(chosen), [1 + c for c in more]
-        return left[np.ix_(at, at)], left[at, 0]
+        left = self._left(chosen, more)
+        return left[1:, 1:], left[1:, 0]
 
     def mixed(self, chosen: Sequence[int], more: Sequence[int], weights: np.ndarray) -> "Products":
         """With the candidate columns `chosen` and sums of `more`, their `weights` (len(more), m), for candidates."""
-        kept = [*range(self.known), *(self.known + c for c in chosen)]
+        kept = [0, *self._index(chosen)]
         whole = np.zeros((len(self.gram), len(kept) + weights.shape[1]))
         whole[kept, range(len(kept))] = 1.0
         whole[[self.known + c for c in more], len(kept) :] = weights
@@ -139,9 +139,12 @@ class Products:
         worth = np.repeat([0.0, 1.0 / self.samples], [self.known - 1, len(chosen)])
         return gram[np.ix_(index, index)] + np.diag(worth)
 
-    def _left(self, chosen: Sequence[int]) -> np.ndarray:
-        """(1 + q, 1 + q) products of the residual and all candidates, less what `chosen` and parameters take up."""
-        rest = [0, *range(self.known, len(self.gram))]
+    def _left(self, chosen: Sequence[int], more: Sequence[int] | None = None) -> np.ndarray:
+        """(1 + q, 1 + q) products of the residual and candidates, less what `chosen` and parameters take up.
+
+        Of the candidate columns `more`, or of all.
+        """
+        rest = [0, *(self.known + c for c in (range(len(self.gram) - self.known) if more is None else more))]
         mixed = self.gram[np.ix_(self._index(chosen), rest)]
         return self.gram[np.ix_(rest, rest)] - mixed.T @ np.linalg.solve(self._block(self.gram, chosen), mixed)
 
@@ -192,7 +195,8 @@ class Evidence:
 
     def left(self, chosen: Sequence[int], products: Products) -> Columns:
         """The residual, less what free parameters and `chosen` take up of it according to `products`."""
-        return jax.tree.map(lambda column: (column @ products.weights(chosen))[..., None], self.whole)
+        weights = products.weights(chosen)
+        return jax.tree.map(lambda column: (column @ weights)[..., None], self.whole)
 
     def picked(self, chosen: Sequence[int]) -> Columns:
         """Some of the candidates' columns."""

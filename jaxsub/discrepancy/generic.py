@@ -24,6 +24,7 @@ from .view import View
 _SHARES = (1.0, 0.1, 0.01)
 # of what a smooth function tells, from which a force of few knots is near enough to stand for it
 _NEAR = 0.5
+# of all that the knots tell, which each tells at least
 _ROUNDING = 1e-9
 
 

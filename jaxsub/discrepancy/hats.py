@@ -49,9 +49,9 @@ def promising(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) ->
 
 def _told(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
     """(n,) share of each equation's missing force that the force's variable tells in pieces by the other pieces."""
-    shapes, live = _shapes(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
+    drawn, live = shapes(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
     pieces = [(r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), _PIECES)]
-    H, y = [shapes[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
+    H, y = [drawn[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
     G = np.array([h.T @ h for h in H])
     b, squares = np.array([h.T @ v for h, v in zip(H, y, strict=True)]), np.array([np.sum(v**2, axis=0) for v in y])
     others = G.sum(axis=0) - G + _NOTHING * np.eye(_CHOOSING)
@@ -64,11 +64,11 @@ def hats(view: View, force: SmoothForce, knots: int) -> list[np.ndarray]:
     """The force of each of its hats at both ends of each interval, (2, R, K-1, n)."""
     equations = view.vehicle.layout.equations
     own = np.eye(len(equations))[equations.index(force.equation)]
-    shapes = _shapes(_place(view, force), knots)
-    return [shapes[..., j, None] * own for j in range(knots)]
+    drawn = shapes(_place(view, force), knots)
+    return [drawn[..., j, None] * own for j in range(knots)]
 
 
-def _shapes(place: np.ndarray, knots: int) -> np.ndarray:
+def shapes(place: np.ndarray, knots: int) -> np.ndarray:
     """(..., knots) hats at equidistant knots, `place` being 0 at the first and 1 at the last."""
     return np.maximum(0.0, 1.0 - np.abs(place[..., None] * (knots - 1) - np.arange(knots)))
 

@@ -10,12 +10,11 @@ from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numb
 from ..estimate import Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
+from .selector import SIGNIFICANCE
 from .view import View
 
 # a shape such as a lag at which its effect is gone
 _VANISHED = 1e-6
-# p-value of nothing from which an effect is not told
-_TOLD = 0.01
 
 
 def join(view: View, fit: Fit, effects: Sequence[AbstractEffect]) -> Fit:
@@ -69,7 +68,7 @@ def told(view: View, effects: Sequence[AbstractEffect]) -> bool:
         at = [names.index(name) for name in own]
         size = np.array([float(values[name]) for name in own])
         wald = size @ np.linalg.solve(view.covariance[np.ix_(at, at)], size)
-        if not special.chdtrc(len(at), max(float(wald), 0.0)) < _TOLD:
+        if not special.chdtrc(len(at), max(float(wald), 0.0)) < SIGNIFICANCE:
             return False
     return True
 

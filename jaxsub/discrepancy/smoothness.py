@@ -23,6 +23,7 @@ import numpy as np
 
 from ..effects import KNOTS
 from .evidence import Products
+from .hats import shapes
 
 # three knots between any two of `SmoothForce`
 FINE = 4 * (KNOTS - 1) + 1
@@ -70,5 +71,4 @@ def _roots() -> list[np.ndarray]:
 
 def coarse() -> np.ndarray:
     """(FINE, KNOTS) the hats of `SmoothForce` in terms of the fine ones."""
-    place = np.arange(FINE)[:, None] / ((FINE - 1) / (KNOTS - 1))
-    return np.maximum(0.0, 1.0 - np.abs(place - np.arange(KNOTS)))
+    return shapes(np.linspace(0.0, 1.0, FINE), KNOTS)
