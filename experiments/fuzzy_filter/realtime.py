@@ -7,6 +7,7 @@ come, 24 ms; that is the budget of a cycle: decode, construct an attitude, step 
 import gc
 import os
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from jaxsub.effects import GRAVITY
 from jaxsub.filter import AbstractNoiseRule, ConsistentFuzzyNoise, ExtendedKalmanFilter, FuzzyNoise
 from jaxsub.navigation import link
-from jaxsub.navigation.ahead import Packed, Program, ahead_of_time
+from jaxsub.navigation.ahead import Packed, Program, native
 from jaxsub.navigation.attitude import Gyro, RotationAttitude
 from jaxsub.navigation.constructed import ConstructedAttitudeStream
 from jaxsub.navigation.stream import Reading, Stream
@@ -41,6 +42,8 @@ _PARTS = ("decode", "construct", "filter", "cycle")
 _WARM = 100
 _UNRESTED = 1000
 _NOWHERE = np.zeros(3)
+# by JAX's compiler, and by way of C
+_COMPILERS: dict[str, Callable[..., Program]] = {"": Program, " in C": native}
 
 
 class Flight(NamedTuple):
@@ -88,15 +91,40 @@ def arrivals(run: Flight, line: link.Line) -> list[bytes]:
     return [data for _, data in line.carry(frames)]
 
 
-@dataclass
-class Loop:
-    """The host's loop; `track` is time and quaternion after each frame, `spent` s in each of `_PARTS`."""
+class Programs(NamedTuple):
+    """What a loop runs, its states at the start, and how long the filter's compilation took."""
 
     construct: Program
     filter: Program
     constructing: Packed
     filtering: Packed
     compile_s: float
+
+
+def programs(rule: AbstractNoiseRule, compiler: Callable[..., Program]) -> Programs:
+    """Compiled for a start that is level and without bias."""
+    first = np.concatenate([np.full(3, 10.0), np.ones(3)]) * _DEGREE
+    filter = ExtendedKalmanFilter(RotationAttitude(), rule, jnp.diag(jnp.asarray(_MEASURED)), jnp.diag(first))
+    stream, zeros = Stream(filter), jnp.zeros(3)
+    reading = Reading(jnp.zeros(()), Gyro(zeros), zeros, jnp.zeros(3, bool))
+    begun = filter.start(jnp.array([1.0, *[0.0] * 6]), jnp.zeros(0), jnp.zeros((0, 0)))
+    level = ConstructedAttitudeStream.start()
+    like = (jnp.zeros(()), zeros, zeros, jnp.zeros((), bool))
+    construct = compiler(lambda state, seen: state.step(*seen), level, like)
+    still = stream.start(begun, reading)
+    begin = time.perf_counter()
+    program = compiler(stream.step, still, reading)
+    taken = time.perf_counter() - begin
+    return Programs(construct, program, construct.pack(level), program.pack(still), taken)
+
+
+@dataclass
+class Loop:
+    """The host's loop; `track` is time and quaternion after each frame, `spent` s in each of `_PARTS`."""
+
+    runs: Programs
+    constructing: Packed
+    filtering: Packed
     decoder: link.Decoder = field(default_factory=link.Decoder)
     track: list[np.ndarray] = field(default_factory=list)
     spent: list[tuple[float, ...]] = field(default_factory=list)
@@ -113,31 +141,14 @@ class Loop:
             fix, present = (_NOWHERE, False) if reading.fix is None else (reading.fix, True)
             shown = (reading.time, reading.accelerometer, fix, present, reading.gyro)
             given: Any = tuple(map(np.asarray, shown))
-            self.constructing, found = self.construct.step(self.constructing, given[:4])
+            self.constructing, found = self.runs.construct.step(self.constructing, given[:4])
             second = now()
             seen = Reading(given[0], Gyro(given[4]), found.angles, found.known)
-            self.filtering, estimate = self.filter.step(self.filtering, seen)
+            self.filtering, estimate = self.runs.filter.step(self.filtering, seen)
             third = now()
             constructing, filtering = constructing + second - first, filtering + third - second
             self.track.append(np.concatenate([[reading.time], estimate.x[:4]]))
         self.spent.append((decoded, constructing, filtering, now() - begin))
-
-
-def loop(rule: AbstractNoiseRule) -> Loop:
-    """Level and without bias at the start."""
-    first = np.concatenate([np.full(3, 10.0), np.ones(3)]) * _DEGREE
-    filter = ExtendedKalmanFilter(RotationAttitude(), rule, jnp.diag(jnp.asarray(_MEASURED)), jnp.diag(first))
-    stream, zeros = Stream(filter), jnp.zeros(3)
-    reading = Reading(jnp.zeros(()), Gyro(zeros), zeros, jnp.zeros(3, bool))
-    begun = filter.start(jnp.array([1.0, *[0.0] * 6]), jnp.zeros(0), jnp.zeros((0, 0)))
-    level = ConstructedAttitudeStream.start()
-    like = (jnp.zeros(()), zeros, zeros, jnp.zeros((), bool))
-    construct = Program(lambda state, seen: state.step(*seen), level, like)
-    still = stream.start(begun, reading)
-    begin = time.perf_counter()
-    program = ahead_of_time(stream, still, reading)
-    taken = time.perf_counter() - begin
-    return Loop(construct, program, construct.pack(level), program.pack(still), taken)
 
 
 def _rules() -> dict[str, AbstractNoiseRule]:
@@ -145,9 +156,9 @@ def _rules() -> dict[str, AbstractNoiseRule]:
     return {"fuzzy": FuzzyNoise(density, 30.0 * density), "consistent": ConsistentFuzzyNoise(density)}
 
 
-def _flown(rule: AbstractNoiseRule, sent: list[bytes], pause: float = 0.0) -> Loop:
+def _flown(runs: Programs, sent: list[bytes], pause: float = 0.0) -> Loop:
     """The loop after all that arrived, with a `pause` before each cycle."""
-    whole = loop(rule)
+    whole = Loop(runs, runs.constructing, runs.filtering)
     gc.collect()
     gc.disable()
     for k, data in enumerate(sent):
@@ -187,7 +198,7 @@ def _undisturbed() -> str:
 
 
 def _draw(path: Path, spent: dict[str, np.ndarray]) -> None:
-    figure, axes = plt.subplots(1, len(spent), figsize=(12.0, 4.2), sharey=True, layout="constrained")
+    figure, axes = plt.subplots(1, len(spent), figsize=(3.6 * len(spent), 4.2), sharey=True, layout="constrained")
     colours = ("#9fb9cf", "#6f9bc4", "#1f4e79", "k")
     bins = np.geomspace(5.0, 5e4, 121)
     for axis, (name, rows) in zip(axes, spent.items(), strict=True):
@@ -212,25 +223,29 @@ def run(out: Path, quick: bool) -> dict:
     lines = {"perfect": link.Line(rng), "faulty": link.Line(rng, **_FAULTS)}
     sent = {name: arrivals(whole, line) for name, line in lines.items()}
     latency, attitude, spent, links, missed = {}, {}, {}, {}, {}
-    for rule_name, rule in _rules().items():
+    ready = {
+        f"{rule_name}{said}": programs(rule, compiler)
+        for rule_name, rule in _rules().items()
+        for said, compiler in _COMPILERS.items()
+    }
+    for rule_name, runs in ready.items():
         for name, data in sent.items():
             p99, flown = [], None
             for _ in range(1 if quick else 5):
-                flown = _flown(rule, data)
+                flown = _flown(runs, data)
                 p99.append(_latency(np.array(flown.spent))["filter"]["p99"])
             assert flown is not None
             rows, key = np.array(flown.spent), f"{rule_name}, {name} link"
             spent[key] = rows
-            latency[key] = {**_latency(rows), "filter_p99_of_runs": p99, "compile_s": flown.compile_s}
+            latency[key] = {**_latency(rows), "filter_p99_of_runs": p99, "compile_s": runs.compile_s}
             missed[key] = int(np.sum(rows[_WARM:, 3] > _BUDGET))
             attitude[key] = _error(np.array(flown.track), whole)
             decoder = flown.decoder
             links[name] = {"sent": len(whole.times), "good": decoder.good, "bad": decoder.bad}
-    paced = np.array(
-        _flown(_rules()["consistent"], sent["faulty"][: _WARM + (100 if quick else 500)], 1.0 / _RATE).spent
-    )
+    few = sent["faulty"][: _WARM + (100 if quick else 500)]
+    paced = np.array(_flown(ready["consistent in C"], few, 1.0 / _RATE).spent)
     kept = {key: rows for key, rows in spent.items() if "faulty" in key}
-    _draw(out / "latency.png", {**kept, "consistent, faulty link, at 25 Hz": paced})
+    _draw(out / "latency.png", {**kept, "consistent in C, faulty link, at 25 Hz": paced})
     return {
         "latency": latency,
         "latency_paced": _latency(paced),

@@ -1,6 +1,6 @@
 """Where a vehicle is and how it lies: attitude, position and strapdown filters, and streams that flight loops call."""
 
-from .ahead import Program, ahead_of_time
+from .ahead import Program, ahead_of_time, native
 from .alignment import Alignment, MagneticField, aligned
 from .attitude import Gyro, PaperAttitude, RotationAttitude
 from .constructed import (
@@ -45,5 +45,6 @@ __all__ = [
     "constructed_attitude",
     "constructed_over",
     "follow",
+    "native",
     "standard_deviations",
 ]

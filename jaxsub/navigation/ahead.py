@@ -4,6 +4,8 @@ A call costs the host about a microsecond for each array that goes in or comes o
 starts; a stream's state, a reading and an estimate together have some forty. Here all numbers of one type travel in one
 array: a state stays packed from call to call, and is unpacked when somebody asks for it.
 
+`native` makes C of the step, which has no kernels to start and takes half as long; it needs a C compiler and CasADi.
+
 By default JAX hands a program on the CPU to another thread and waits for it. A loop that is alone in its process saves
 that by `jax.config.update("jax_cpu_enable_async_dispatch", False)` before anything is computed.
 """
@@ -20,7 +22,9 @@ from jaxtyping import Array
 from ..errors import InputError
 from .stream import AbstractStream
 
-Packed = tuple[Array, ...]
+Packed = tuple[Array | np.ndarray, ...]
+Compiled = Callable[[Packed, Packed], tuple[Packed, Packed]]
+Compiler = Callable[[Compiled, Packed, Packed], Compiled]
 _TRUTH = np.dtype(bool)
 
 
@@ -35,15 +39,19 @@ class _Leaf(NamedTuple):
 
 
 class _Layout:
-    """How a pytree of arrays lies in flat ones, one of each type; truth values are ones and zeros among the rest."""
+    """How a pytree of arrays lies in flat ones, one of each type; truth values are ones and zeros among the rest.
 
-    def __init__(self, like: Any):
+    Or all in one of type `one`.
+    """
+
+    def __init__(self, like: Any, one: np.dtype | None = None):
         leaves, self.structure = jax.tree.flatten(like)
         kinds = [np.dtype(leaf.dtype) for leaf in leaves]
         self.kinds = sorted(set(kinds) - {_TRUTH}, key=str) or [np.dtype(np.int32)]
+        self.kinds = self.kinds if one is None else [one]
         ends, self.leaves = [0] * len(self.kinds), []
         for leaf, kind in zip(leaves, kinds, strict=True):
-            pack = 0 if kind == _TRUTH else self.kinds.index(kind)
+            pack = self.kinds.index(kind) if kind in self.kinds else 0
             first = ends[pack]
             ends[pack] += math.prod(leaf.shape)
             self.leaves.append(_Leaf(leaf.shape, kind, pack, first, ends[pack]))
@@ -53,7 +61,8 @@ class _Layout:
         """The arrays of `tree` within a program."""
         parts: list[list[Array]] = [[] for _ in self.kinds]
         for at, leaf in zip(self.leaves, jax.tree.leaves(tree), strict=True):
-            parts[at.pack].append(jnp.ravel(leaf).astype(self.kinds[at.pack]))
+            # double precision is the caller's choice
+            parts[at.pack].append(jnp.ravel(leaf).astype(jnp.result_type(self.kinds[at.pack])))
         return tuple(jnp.concatenate(part) for part in parts)
 
     def given(self, tree: Any, where: str) -> tuple[np.ndarray, ...]:
@@ -77,28 +86,59 @@ class _Layout:
         for at in self.leaves:
             part = packs[at.pack][at.first : at.last]
             part = part if len(at.shape) == 1 else part.reshape(at.shape)
-            leaves.append(part.astype(bool) if at.dtype == _TRUTH else part)
+            leaves.append(part if part.dtype == at.dtype else part.astype(at.dtype))
         return jax.tree.unflatten(self.structure, leaves)
+
+
+def _by_xla(call: Compiled, state: Packed, seen: Packed) -> Compiled:
+    return jax.jit(call).lower(state, seen).compile()
+
+
+def _by_c(call: Compiled, state: Packed, seen: Packed) -> Compiled:
+    # an extra that the other way does without
+    from ..symbolic import casadi_function, compiled
+
+    program = compiled(casadi_function(call, state, seen, name="step"))
+    (state_in, seen_in), (state_out, found) = program.given, program.found
+
+    def run(state: Packed, seen: Packed) -> tuple[Packed, Packed]:
+        state_in[:], seen_in[:] = state[0], seen[0]
+        program()
+        return (state_out.copy(),), (found.copy(),)
+
+    return run
 
 
 class Program:
     """A step `(state, reading) -> (state, estimate)` for the shapes and types that it was compiled for."""
 
-    def __init__(self, step: Callable[[Any, Any], tuple[Any, Any]], state: Any, reading: Any):
-        """What else the step uses becomes part of the program."""
-        self._state, self._reading = _Layout(state), _Layout(reading)
-        self._estimate = _Layout(jax.eval_shape(step, state, reading)[1])
+    def __init__(
+        self,
+        step: Callable[[Any, Any], tuple[Any, Any]],
+        state: Any,
+        reading: Any,
+        *,
+        compiler: "Callable[[Compiled, Packed, Packed], Compiled]" = lambda call, *like: (
+            jax.jit(call).lower(*like).compile()
+        ),
+        one: np.dtype | None = None,
+    ):
+        """What else the step uses becomes part of the program; `compiler` is told the shapes of one call.
+
+        Numbers travel in one array of each type, or all in one of type `one`.
+        """
+        self._state, self._reading = _Layout(state, one), _Layout(reading, one)
+        self._estimate = _Layout(jax.eval_shape(step, state, reading)[1], one)
 
         def packed(state: Packed, seen: Packed) -> tuple[Packed, Packed]:
             after, estimate = step(self._state.unpacked(state), self._reading.unpacked(seen))
             return self._state.packed(after), self._estimate.packed(estimate)
 
-        like = (self.pack(state), self._reading.given(reading, "reading"))
-        self._compiled = jax.jit(packed).lower(*like).compile()
+        self._compiled = compiler(packed, self.pack(state), self._reading.given(reading, "reading"))
 
     def pack(self, state: Any) -> Packed:
         """`state` as `step` takes it; **raises** `InputError` for other shapes or types."""
-        return tuple(map(jnp.asarray, self._state.given(state, "state")))
+        return self._state.given(state, "state")
 
     def unpack(self, packed: Packed) -> Any:
         """The state again, of JAX's arrays."""
@@ -120,3 +160,12 @@ def ahead_of_time(stream: AbstractStream, state: Any, reading: Any) -> Program:
     In a flight loop: `packed = program.pack(state)`, then `packed, estimate = program.step(packed, reading)` for each.
     """
     return Program(stream.step, state, reading)
+
+
+def native(step: Callable[[Any, Any], tuple[Any, Any]], state: Any, reading: Any) -> Program:
+    """The same of any `step`, by way of C, in double precision: `native(stream.step, state, reading)`.
+
+    C code for another processor: `jaxsub.symbolic.write_c(casadi_function(step, state, reading), path)`. **Raises**
+    `InputError` where CasADi or a C compiler is missing, and for a step with an operation that has no counterpart in C.
+    """
+    return Program(step, state, reading, compiler=_by_c, one=np.dtype(np.float64))

@@ -1,6 +1,7 @@
 """Whatever readings are like, a stream stays finite and counts what was wrong, in flight as off-line."""
 
 import dataclasses
+import shutil
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,7 @@ from stream_cases import STOP, altered, at, attitude_stream, counted, gentle_rea
 
 from jaxsub.errors import InputError
 from jaxsub.filter import ConstantNoise, RandomNoise, Sample
-from jaxsub.navigation.ahead import ahead_of_time
+from jaxsub.navigation.ahead import ahead_of_time, native
 from jaxsub.navigation.attitude import Gyro
 from jaxsub.navigation.stream import follow
 
@@ -29,6 +30,21 @@ def test_in_flight_and_off_line_say_the_same():
     state = program.unpack(packed)
     same(state, last, atol=1e-13)
     assert counted(state.faults) == {}
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_the_step_in_c_says_the_same():
+    """Through a start, measurements and their absence, and a reading that is passed over."""
+    readings = spliced(gentle_readings(), 10, mask=jnp.ones(3, bool), **PASSED_OVER["behind"])
+    stream = attitude_stream()
+    state = started(stream, readings)
+    last, estimates = follow(stream, state, readings)
+    program = native(stream.step, state, at(readings, 0))
+    packed = program.pack(state)
+    for k in range(len(readings.time)):
+        packed, estimate = program.step(packed, at(readings, k))
+        same(estimate, at(estimates, k), atol=1e-12)
+    same(program.unpack(packed), last, atol=1e-12)
 
 
 def test_many_recordings_at_once_are_each_of_them():
