@@ -135,10 +135,14 @@ def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
 
 
 def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
-    """The first of `chosen` that stands by itself, as the best of its twins, the most probable fit first."""
+    """The first that stands by itself of `chosen` and their twins, the most probable fit first; with those after it.
+
+    A twin that the training runs find more probable and the held-out runs refuse is none of its rivals.
+    """
     for fits in sorted((tries.closest([], index) for index in chosen), key=lambda fits: -fits[0][1]):
-        if tries.helps([], fits[0][0]):
-            return {fits[0][0]: fits}
+        for place, (index, value) in enumerate(fits):
+            if np.isfinite(value) and tries.helps([], index):
+                return {index: fits[place:]}
     return {}
 
 

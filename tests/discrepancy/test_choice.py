@@ -8,6 +8,7 @@ from experiments.next_manoeuvre.cases import case
 from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.model import told
 from jaxsub.discrepancy.name import Named, refitted
+from jaxsub.discrepancy.trial import Tries, alone
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
@@ -47,3 +48,27 @@ def test_what_is_there_is_told_and_what_is_not_is_not():
     assert told(view, [scale])
     assert not told(view, [asymmetry])
     assert not told(view, [scale, asymmetry])
+
+
+class Fitted(Tries):
+    """A candidate 0 and its twins 1 and 2 with the evidence of their fits, and who of them stands."""
+
+    def __init__(self):
+        self.fits, self.stand = [(0, 30.0), (1, 20.0), (2, -np.inf)], ()
+
+    def closest(self, others, index):
+        return self.fits
+
+    def helps(self, fewer, more):
+        assert np.isfinite(dict(self.fits)[more])
+        return more in self.stand
+
+
+def test_a_twin_that_the_held_out_runs_refuse_gives_way_to_the_next():
+    """Claim: the most probable that stands is taken, what was refused before it is no rival, and an unsound fit none."""
+    tries = Fitted()
+    assert alone(tries, [0]) == {}
+    tries.stand = (1,)
+    assert alone(tries, [0]) == {1: [(1, 20.0), (2, -np.inf)]}
+    tries.stand = (0, 1)
+    assert alone(tries, [0]) == {0: tries.fits}
