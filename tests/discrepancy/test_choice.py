@@ -65,7 +65,7 @@ class Fitted(Tries):
 
 
 def test_a_twin_that_the_held_out_runs_refuse_gives_way_to_the_next():
-    """Claim: the most probable that stands is taken, what was refused before it is no rival, and an unsound fit none."""
+    """Claim: the most probable that stands is taken, what was refused before it is no rival, an unsound fit none."""
     tries = Fitted()
     assert alone(tries, [0]) == {}
     tries.stand = (1,)
