@@ -2,20 +2,23 @@
 
 from .combined import Chain, Global
 from .disturbance import FROM_AFAR, FROM_NEAR, estimate_disturbance
+from .ends import Ends, ends
 from .filtered import Filtered
 from .fit import Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
-from .method import AbstractMethod, Found, Iterative
+from .method import AbstractMethod, Found, Iterative, share_for
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .problem import Expansion, Problem, initial_guess
-from .starts import Basin, Rate, basins, scattered, success
+from .starts import MARGIN, Basin, Rate, basins, scattered, scattered_by_number, success
 
 __all__ = [
     "FROM_AFAR",
     "FROM_NEAR",
+    "MARGIN",
     "METHODS",
     "AbstractMethod",
     "Basin",
     "Chain",
+    "Ends",
     "Expansion",
     "Filtered",
     "Fit",
@@ -27,6 +30,7 @@ __all__ = [
     "basins",
     "channel_rms",
     "ekf",
+    "ends",
     "estimate_disturbance",
     "evaluate",
     "fit",
@@ -41,6 +45,8 @@ __all__ = [
     "output_errors",
     "predict",
     "scattered",
+    "scattered_by_number",
     "search",
+    "share_for",
     "success",
 ]

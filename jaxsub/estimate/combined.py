@@ -53,10 +53,11 @@ class Global(AbstractMethod):
     def run(
         self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
     ) -> Found:
-        """One evolution for each start."""
+        """One evolution for each start that is a number."""
         of, ends, counts = problems(problem, outputs), [], []
-        for index, start in enumerate(starts):
-            best, count = self._evolve(of(jnp.asarray(index)), np.asarray(start))
+        for index, start in enumerate(np.asarray(starts)):
+            finite = np.isfinite(start).all()
+            best, count = self._evolve(of(jnp.asarray(index)), start) if finite else (start, 0)
             ends.append(best)
             counts.append(count)
         found = self.local.run(problem, jnp.asarray(np.stack(ends)), outputs)

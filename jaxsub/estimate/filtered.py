@@ -13,7 +13,7 @@ from ..filter.passes import identify
 from ..filter.vehicle import VehicleProcess, samples
 from ..results import RESULTS
 from .damped import Damped
-from .method import AbstractMethod, Found, costs, holding, lanes_for, objective, over_cores, problems
+from .method import AbstractMethod, Found, costs, holding, in_shares, lanes_for, objective, problems
 from .pool import pool
 from .problem import Problem
 
@@ -44,7 +44,7 @@ class Filtered(AbstractMethod):
 
         **Raises** `InputError` as `VehicleProcess` does.
         """
-        return over_cores(lambda y, z: _filtered(self, problem, y, z), problem, starts, outputs)
+        return in_shares(_filtered, self, problem, starts, outputs)
 
 
 @eqx.filter_jit

@@ -12,7 +12,6 @@ from ..recording.runs import Runs
 from ..results import RESULTS
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
-from ..vehicle.inertia import indefinite
 from .method import AbstractMethod
 from .methods import gauss_newton
 from .problem import Problem
@@ -177,11 +176,7 @@ def evaluate(
     names = tuple(row.name for row in vehicle.layout.free)
     problem = Problem.of(vehicle, runs, sigma, start if known_start else None, known_start=known_start)
     covariance, gradient = _statistics(problem, model)
-    inertia = np.asarray(vehicle.mass_matrix())
-    if not np.all(np.isfinite(inertia)) or indefinite(inertia, vehicle.layout.equations, []):
-        result = RESULTS.indefinite_inertia
-    elif bool(result == RESULTS.successful) and not float(gradient) < 0.1:
-        result = RESULTS.not_stationary
+    result = judged(vehicle, gradient, result)
     return Fit(vehicle, runs, start, sigma, covariance, model, cost, gradient, steps, result, names, known_start)
 
 
@@ -189,13 +184,30 @@ def evaluate(
 def _statistics(problem: Problem, model: Linearised) -> tuple[Array, Array]:
     """Covariance of the free parameters, and the gradient in standard errors."""
     information, gradient = information_matrix(problem, model)
+    covariance = inverse_information(information)
+    return covariance, jnp.max(standard_errors_away(covariance, gradient), initial=0.0)
+
+
+def inverse_information(information: Float[Array, "p p"]) -> Float[Array, "p p"]:
+    """The covariance that the information allows: a direction without any gets no false certainty elsewhere."""
     size = jnp.sqrt(jnp.maximum(jnp.diag(information), 1e-300))
-    # a pseudo-inverse in equilibrated coordinates: a direction without information gets no false certainty elsewhere
+    # a pseudo-inverse in equilibrated coordinates
     values, vectors = jnp.linalg.eigh(information / jnp.outer(size, size))
     inverse = (vectors / jnp.maximum(values, 1e-14)) @ vectors.T
-    covariance = inverse / jnp.outer(size, size)
-    step = (covariance @ gradient) / jnp.sqrt(jnp.maximum(jnp.diag(covariance), 1e-300))
-    return covariance, jnp.max(jnp.abs(step), initial=0.0)
+    return inverse / jnp.outer(size, size)
+
+
+def standard_errors_away(covariance: Float[Array, "p p"], gradient: Float[Array, " p"]) -> Float[Array, " p"]:
+    """How many standard errors a Newton step from here would move each parameter."""
+    return jnp.abs(covariance @ gradient) / jnp.sqrt(jnp.maximum(jnp.diag(covariance), 1e-300))
+
+
+def judged(vehicle: AbstractVehicle, away: Float[Array, ""], result: RESULTS) -> RESULTS:
+    """`result`, unless the fitted inertia is not positive definite or the end is 0.1 standard errors from an optimum."""
+    inertia = vehicle.mass_matrix()
+    definite = jnp.all(jnp.linalg.eigvalsh(0.5 * (inertia + inertia.T)) > 0.0)
+    result = RESULTS.where((result == RESULTS.successful) & ~(away < 0.1), RESULTS.not_stationary, result)
+    return RESULTS.where(definite, result, RESULTS.indefinite_inertia)
 
 
 def information_matrix(problem: Problem, model: Linearised) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:

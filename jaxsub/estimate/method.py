@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
+from jax.sharding import Mesh, PartitionSpec
 from jaxtyping import Array, Bool, Float, Int
 
 from ..results import RESULTS
@@ -20,6 +21,8 @@ from .problem import Problem
 
 # a search's working set is this many copies of its whitened Jacobian; lanes share what memory there is
 _COPIES, _MEMORY, _LANES = 6, 1.0e9, 8
+# searches that a lane takes one after the other: enough that little time goes by with lanes idle at the end of a share
+_TURNS = 8
 
 
 class Found(eqx.Module):
@@ -67,28 +70,48 @@ class Iterative(AbstractMethod):
         self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
     ) -> Found:
         """All starts through pools of lanes. Not to be called in `jit`."""
-        return over_cores(lambda y, z: _pooled(self, problem, y, z, lanes_for(problem)), problem, starts, outputs)
+        return in_shares(_pooled, self, problem, starts, outputs)
 
 
-def over_cores(
-    run: Callable[[Array, Array | None], Found], problem: Problem, starts: Array, outputs: Array | None
-) -> Found:
-    """`run(starts, outputs)` in equal shares, one a core, where there are starts enough to be worth it."""
-    cores = os.cpu_count() or 1
-    if len(starts) < 4 * lanes_for(problem) * cores:
-        return run(starts, outputs)
-    # the last share is filled up with copies, so that one compiled program serves all
-    share = -(-len(starts) // cores)
-    index = np.minimum(np.arange(share * cores), len(starts) - 1).reshape(cores, share)
-    own = lambda chosen: run(starts[chosen], None if outputs is None else outputs[chosen])
-    with ThreadPoolExecutor(cores) as threads:
-        parts = list(threads.map(lambda chosen: jax.block_until_ready(own(chosen)), index))
-    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[: len(starts)], *parts)
+Program = Callable[[Any, Problem, Array, Array | None], Found]
+
+
+def in_shares(program: Program, method: Any, problem: Problem, starts: Array, outputs: Array | None) -> Found:
+    """`program(method, problem, starts, outputs)` in shares of one size, over all local devices or, if one, all cores.
+
+    Where a share begins depends on neither, so the same start meets the same program with the same neighbours and ends
+    at the same number to the last digit wherever it runs. The last share is filled up with starts that end at once.
+    """
+    count, size = len(starts), share_for(problem)
+    if count <= size:
+        return program(method, problem, starts, outputs)
+    devices = jax.local_devices()
+    shares = -(-count // (size * len(devices))) * len(devices)
+    fill = lambda a: jnp.concatenate([a, jnp.full((shares * size - count, *a.shape[1:]), jnp.nan, a.dtype)])
+    cut = lambda a: fill(a).reshape(-1, len(devices) * size, *a.shape[1:])
+    rounds = zip(cut(starts), [None] * shares if outputs is None else cut(outputs), strict=False)
+    if len(devices) > 1:
+        parts = [_over_devices(program, method, problem, *part) for part in rounds]
+    else:
+        own = lambda part: jax.block_until_ready(program(method, problem, *part))
+        with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
+            parts = list(threads.map(own, rounds))
+    return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:count], *parts)
 
 
 @eqx.filter_jit
-def _pooled(method: Iterative, problem: Problem, starts: Array, outputs: Array | None, lanes: int) -> Found:
-    of = problems(problem, outputs)
+def _over_devices(program: Program, method: Any, problem: Problem, starts: Array, outputs: Array | None) -> Found:
+    """One share on each local device; none waits for another before the end."""
+    mesh, each, same = Mesh(np.array(jax.local_devices()), ("share",)), PartitionSpec("share"), PartitionSpec()
+    numbers, rest = eqx.partition((method, problem), eqx.is_array)
+    own = lambda numbers, starts, outputs: program(*eqx.combine(numbers, rest), starts, outputs)
+    shared = jax.shard_map(own, mesh=mesh, in_specs=(same, each, each), out_specs=each, check_vma=False)
+    return shared(numbers, starts, outputs)
+
+
+@eqx.filter_jit
+def _pooled(method: Iterative, problem: Problem, starts: Array, outputs: Array | None) -> Found:
+    of, lanes = problems(problem, outputs), lanes_for(problem)
     ends = pool(method.solver, objective, starts, of, lanes=lanes, max_steps=method.max_steps)
     # without a value at the very start there is nothing that a search could have done
     never = (ends.steps == 1) & (ends.result == RESULTS.promote(optx.RESULTS.nonfinite))
@@ -120,3 +143,8 @@ def lanes_for(problem: Problem) -> int:
     """How many searches may share the memory at once."""
     columns = len(problem.prior_mean) + len(problem.spread) + 1
     return int(max(1, min(_LANES, _MEMORY / (8 * _COPIES * problem.runs.outputs.size * columns))))
+
+
+def share_for(problem: Problem) -> int:
+    """How many starts go through one pool, each with a recording of its own, which the memory has to hold too."""
+    return int(max(1, min(_TURNS * lanes_for(problem), _MEMORY / (8 * problem.runs.outputs.size))))

@@ -5,7 +5,7 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int, PRNGKeyArray
 from scipy import stats
 from scipy.cluster import hierarchy
 
@@ -21,10 +21,25 @@ def scattered(problem: Problem, spread: float, count: int, seed: int) -> Float[A
 
     A spread of 1 draws from zero to twice each value. Initial states start at their guess.
     """
-    centre = np.asarray(problem.transform.to_physical(problem.origin))
-    draws = np.random.default_rng(seed).uniform(-spread, spread, (count, len(centre)))
-    starts = jnp.asarray(centre * (1.0 + draws))
-    return jax.vmap(problem.at)(starts)
+    draws = np.random.default_rng(seed).uniform(-spread, spread, (count, len(problem.origin)))
+    return _moved(problem, jnp.asarray(draws))
+
+
+def scattered_by_number(
+    problem: Problem, spread: float, numbers: Int[Array, " n"], key: PRNGKeyArray
+) -> Float[Array, "n d"]:
+    """Such starts again, each drawn by `key` and its own number alone: a part of them is drawn as all of them are."""
+
+    def draw(number: Array) -> Array:
+        shape = problem.origin.shape
+        return jax.random.uniform(jax.random.fold_in(key, number), shape, minval=-spread, maxval=spread)
+
+    return _moved(problem, jax.vmap(draw)(numbers))
+
+
+def _moved(problem: Problem, draws: Float[Array, "n p"]) -> Float[Array, "n d"]:
+    centre = problem.transform.to_physical(problem.origin)
+    return jax.vmap(problem.at)(centre * (1.0 + draws))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,8 +65,11 @@ class Rate:
         return {"share": self.share, "interval": list(self.interval), "successes": self.successes, "count": self.count}
 
 
-def success(found: Found, best: float, margin: float = 0.1) -> Rate:
-    """How many searches came within `margin` of the least cost known: 0.1 is under half a standard error away.
+MARGIN = 0.1  # in cost: under half a standard error away
+
+
+def success(found: Found, best: float, margin: float = MARGIN) -> Rate:
+    """How many searches came within `margin` of the least cost known.
 
     One that failed, or whose cost is not a number, is no success and is counted.
     """

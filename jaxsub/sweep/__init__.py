@@ -1,0 +1,12 @@
+"""Sweeps: Monte-Carlo over initial guesses, noise, vehicles and recordings, on this machine or on a cluster."""
+
+from .answered import answered
+from .dataset import open_sweep
+from .described import described
+from .execute import sweep
+from .plan import Chunk, Plan
+from .run import OUTCOMES, run_chunks
+from .store import Store
+from .summary import summarised
+
+__all__ = ["OUTCOMES", "Chunk", "Plan", "Store", "answered", "described", "open_sweep", "run_chunks", "summarised", "sweep"]

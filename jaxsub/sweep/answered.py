@@ -1,0 +1,34 @@
+"""Recordings as a fitted vehicle would have made them, for sweeps that draw the noise anew."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..discrepancy.batch import batch
+from ..errors import InputError
+from ..estimate import predict, search
+from ..recording import Recording
+from ..vehicle import AbstractVehicle
+
+
+def answered(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> list[Recording]:
+    """`recordings` with every measured sample replaced by the answer, without noise, of `vehicle` fitted to them.
+
+    With seeds of noise on top this is the parametric bootstrap (Efron and Tibshirani 1993, section 6.5): how estimates
+    would scatter, were the same runs recorded again. A sample that is missing stays so.
+
+    **Raises** `InputError` where the model does not run from the file's values.
+    """
+    runs = batch(vehicle, recordings)
+    fitted, states, _, cost, *_ = search(vehicle, runs)
+    if not np.isfinite(float(cost)):
+        what = "the model does not run from these values on " + ", ".join(r.name for r in recordings)
+        raise InputError(vehicle.layout.name, what, "give values that are closer")
+    shown, made = np.asarray(predict(fitted, runs, states)), []
+    for recording, answer in zip(recordings, shown, strict=True):
+        columns = dict(recording.columns)
+        for channel, values in zip(vehicle.layout.channels, answer.T, strict=True):
+            missing = np.isnan(recording.column(channel))
+            columns[channel] = np.where(missing, np.nan, values[: len(missing)])
+        made.append(Recording(recording.name, recording.times, columns, f"{recording.source} (answered)"))
+    return made

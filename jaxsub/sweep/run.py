@@ -1,0 +1,66 @@
+"""The searches of chunks, by the estimators' own pools: a function of the plan and the chunks, and of nothing else."""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..estimate import METHODS, Problem, ends, share_for
+from ..results import RESULTS
+from .plan import Chunk, Plan
+
+# what became of a search, as stores have it: a number for each, which later versions may add to and not change
+OUTCOMES = (
+    "successful",
+    "nonlinear_max_steps_reached",
+    "nonlinear_divergence",
+    "nonfinite",
+    "nan_start",
+    "not_stationary",
+    "indefinite_inertia",
+    "other",
+)
+Answers = dict[str, np.ndarray]
+
+
+def run_chunks(plan: Plan, chunks: Sequence[Chunk]) -> list[Answers]:
+    """The answers of chunks of one case and, but for the last of the case, of one width.
+
+    Each is a dictionary of arrays over the chunk's n searches: `start`, `estimate` and `standard_error` (n, p) of the
+    free coefficients, SI; `coordinates` (n, d) of the end; `cost`; `away`, how many standard errors the optimum may
+    still be off; `evaluations`; and `outcome`, an index to `OUTCOMES`.
+    """
+    case = chunks[0].case
+    problem, width = plan.problems[case], max(chunk.last - chunk.first for chunk in chunks)
+    # a short chunk is filled up, so that what it holds is cut into the same shares as anywhere
+    size = -(-width // share_for(problem)) * share_for(problem) if plan.per_case > share_for(problem) else width
+    numbers = np.concatenate([np.minimum(chunk.first + np.arange(size), chunk.last - 1) for chunk in chunks])
+    real = np.concatenate([np.arange(size) < chunk.last - chunk.first for chunk in chunks])
+    starts = jnp.where(real[:, None], plan.start_points(case, numbers), jnp.nan)
+    outputs = plan.outputs(case, numbers)
+    found = METHODS[plan.method]().run(problem, starts, outputs)
+    told = ends(problem, found, outputs)
+    answers = {
+        "start": _physical(problem, starts),
+        "estimate": told.theta,
+        "standard_error": told.standard_errors,
+        "coordinates": found.y,
+        "cost": found.cost,
+        "away": told.away,
+        "evaluations": found.evaluations,
+        "outcome": _outcomes(told.result),
+    }
+    whole = {name: np.asarray(values) for name, values in answers.items()}
+    inside = [index * size + np.arange(chunk.last - chunk.first) for index, chunk in enumerate(chunks)]
+    return [{name: values[own] for name, values in whole.items()} for own in inside]
+
+
+def _physical(problem: Problem, starts: jnp.ndarray) -> jnp.ndarray:
+    return problem.transform.to_physical(starts[:, : len(problem.prior_mean)])
+
+
+def _outcomes(result: RESULTS) -> np.ndarray:
+    code = np.full(len(np.asarray(result == RESULTS.successful)), len(OUTCOMES) - 1, np.int8)
+    for number, name in enumerate(OUTCOMES[:-1]):
+        code[np.asarray(result == getattr(RESULTS, name))] = number
+    return code

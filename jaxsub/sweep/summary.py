@@ -1,0 +1,105 @@
+"""What a sweep says: how many searches succeeded, the basins they ended in, and how far the estimates lie apart."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+import xarray
+
+from ..estimate import MARGIN, Found, Rate, basins
+from ..estimate.method import problems
+from ..results import RESULTS
+from .plan import Plan
+from .run import OUTCOMES
+
+# ends that are sorted into basins, whose distances are all taken: the first of a case
+_SORTED = 2000
+_LISTED = 5
+
+
+def summarised(plan: Plan, dataset: xarray.Dataset) -> dict[str, Any]:
+    """The summary of a sweep as JSON has it; `dataset` is what `sweep` gave for `plan`.
+
+    A success is a search that came within `estimate.MARGIN` of the least cost that any start found on the same
+    recordings. Basins are those of the first noise. Of coefficients it has the best start's estimate; the percentiles
+    of all ends that are numbers; and, where there are seeds of noise, the standard deviation of the best estimates
+    over them beside the standard error that each claims on average.
+    """
+    done = np.asarray(dataset.done)
+    cases = [_case(plan, index, dataset.sel(vehicle=v, recording=r)) for index, (v, r) in enumerate(plan.cases)]
+    return {"schema": 1, "searches": int(done.size), "done": int(done.sum()), "cases": cases}
+
+
+def best_starts(case: xarray.Dataset) -> np.ndarray:
+    """(noise,) the start that found the least cost, for each noise."""
+    return np.argmin(_costs(case), axis=1)
+
+
+def succeeded(case: xarray.Dataset) -> np.ndarray:
+    """(noise, start) whether a search came within `MARGIN` of the least cost known."""
+    cost = _costs(case)
+    return cost < np.min(cost, axis=1, keepdims=True) + MARGIN
+
+
+def _costs(case: xarray.Dataset) -> np.ndarray:
+    """(noise, start) costs, infinite where there is none."""
+    cost = np.asarray(case.cost.transpose("noise", "start"))
+    return np.where(np.isfinite(cost), cost, np.inf)
+
+
+def _case(plan: Plan, index: int, case: xarray.Dataset) -> dict[str, Any]:
+    outcome = np.asarray(case.outcome)[np.asarray(case.done)]
+    counts = np.bincount(outcome, minlength=len(OUTCOMES))
+    good, best = succeeded(case), best_starts(case)
+    found, lost = _basins(plan, index, case)
+    vehicle, recorded = plan.cases[index]
+    return {
+        "vehicle": vehicle,
+        "recording": recorded,
+        "outcomes": {name: int(count) for name, count in zip(OUTCOMES, counts, strict=True) if count},
+        "success": Rate(int(good.sum()), int(good.size)).to_json(),
+        "margin": MARGIN,
+        "least_cost": _number(_costs(case)[0, best[0]]),
+        "basins_found": len(found),
+        "basins": [{"cost": basin.cost, "count": basin.count} for basin in found[:_LISTED]],
+        "without_an_end": lost,
+        "evaluations_median": float(np.median(np.asarray(case.evaluations)[np.asarray(case.done)])),
+        "coefficients": _coefficients(plan.problems[index].vehicle.layout.free, case, best),
+    }
+
+
+def _basins(plan: Plan, index: int, case: xarray.Dataset) -> tuple[list, int]:
+    problem, count = plan.problems[index], min(plan.starts, _SORTED)
+    first = case.isel(noise=0, start=slice(count))
+    y = np.asarray(first.coordinates)[:, : len(problem.coordinates())]
+    told = [jnp.asarray(np.asarray(values)) for values in (y, first.cost, first.evaluations)]
+    own = problems(problem, plan.outputs(index, np.arange(1)))(jnp.asarray(0))
+    return basins(own, Found(*told, RESULTS.successful))
+
+
+def _coefficients(rows: list, case: xarray.Dataset, best: np.ndarray) -> dict[str, Any]:
+    noise, told = np.arange(len(best)), {}
+    for row in rows:
+        own = case.sel(coefficient=row.name)
+        ends = np.asarray(own.estimate)
+        finite = ends[np.isfinite(ends) & np.isfinite(np.asarray(own.cost))]
+        chosen, errors = ends[noise, best], np.asarray(own.standard_error)[noise, best]
+        told[row.name] = {
+            "unit": row.unit,
+            "file_value": float(own.file_value),
+            "best": _number(chosen[0]),
+            "standard_error": _number(errors[0]),
+            "percentiles_5_50_95": [_number(p) for p in np.percentile(finite, (5, 50, 95))] if finite.size else None,
+        }
+        if len(noise) > 1:
+            told[row.name] |= {
+                "mean_over_noise": _number(np.mean(chosen)),
+                "spread_over_noise": _number(np.std(chosen, ddof=1)),
+                "standard_error_mean": _number(np.mean(errors)),
+            }
+    return told
+
+
+def _number(value: float) -> float | None:
+    """A number as JSON has it, which knows neither NaN nor infinity."""
+    return float(value) if np.isfinite(value) else None
