@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -85,6 +86,28 @@ def simulate(vehicle: Path, run: Path, out: Path, overwrite: bool) -> None:
     command.run(vehicle, run, out, overwrite)
 
 
+@app.command()
+@_vehicle
+@_runs
+@_out(required=True)
+@click.option("--starts", type=click.IntRange(1), required=True, help="How many initial guesses.")
+@click.option("--spread", type=click.FloatRange(0.0), default=0.5, show_default=True, help="0.5 draws within ±50 %.")
+@click.option(
+    "--noise-seeds", type=click.IntRange(0), default=0, help="Bootstrap: answers with noise drawn this often."
+)
+@click.option("--vehicle", "others", type=_PATH, multiple=True, help="A further vehicle on the same runs; repeatable.")
+@click.option("--apart", is_flag=True, help="Fit every run on its own instead of all together.")
+@click.option("--method", type=click.Choice(METHODS), default=METHODS[0], show_default=True)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True, help="Of all draws.")
+@click.option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local for one worker a core of this machine.")
+@_overwrite
+def sweep(out: Path, overwrite: bool, **arguments: Any) -> None:
+    """Monte-Carlo over initial guesses; goes on with what is in --out already."""
+    from . import sweep as command
+
+    command.run(command.Asked(**arguments), out, overwrite)
+
+
 def main() -> None:
     """The `jaxsub` command: exit 0 done, 2 bad input with one line on stderr, 1 anything else."""
     try:
@@ -93,8 +116,8 @@ def main() -> None:
         _stop(str(error), 2)
     except click.UsageError as error:
         _stop(f"{' '.join(error.format_message().split())}; see jaxsub --help", 2)
-    except (KeyboardInterrupt, click.Abort):
-        _stop("interrupted; nothing was written", 1)
+    except (KeyboardInterrupt, click.Abort) as error:
+        _stop(str(error) or "interrupted; nothing was written", 1)
     except Exception as error:
         _stop(f"{type(error).__name__}: {' '.join(str(error).split())[:500]}", 1)
 

@@ -9,7 +9,15 @@ import jax
 import platformdirs
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from ..recording import Recording, load
 from ..vehicle import AbstractVehicle
@@ -43,6 +51,27 @@ def progress(title: str) -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting", total=None, title=title)
         yield lambda message: bar.update(task, description=escape(message))
+
+
+@contextmanager
+def counted(title: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar that is told how many are done of how many; on a pipe, a line for each further tenth."""
+    if not console.is_terminal:
+        said = [-1]
+
+        def tell(done: int, total: int) -> None:
+            if 10 * done // total > said[0]:
+                said[0] = 10 * done // total
+                console.print(f"{title}: {done} of {total}", highlight=False, soft_wrap=True, markup=False)
+
+        yield tell
+        return
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn()
+    )  # fmt: skip
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(escape(title), total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def load_runs(paths: Sequence[Path], vehicle: AbstractVehicle) -> list[Recording]:

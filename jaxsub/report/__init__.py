@@ -1,5 +1,6 @@
 """The report: figures, tables and one self-contained page that shows a diagnosis; the only room that draws."""
 
 from .page import write_report
+from .sweeps import sweep_pictures
 
-__all__ = ["write_report"]
+__all__ = ["sweep_pictures", "write_report"]

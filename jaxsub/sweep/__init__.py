@@ -6,7 +6,20 @@ from .described import described
 from .execute import sweep
 from .plan import Chunk, Plan
 from .run import OUTCOMES, run_chunks
-from .store import Store
-from .summary import summarised
+from .store import Store, check_folder
+from .summary import succeeded, summarised
 
-__all__ = ["OUTCOMES", "Chunk", "Plan", "Store", "answered", "described", "open_sweep", "run_chunks", "summarised", "sweep"]
+__all__ = [
+    "OUTCOMES",
+    "Chunk",
+    "Plan",
+    "Store",
+    "answered",
+    "check_folder",
+    "described",
+    "open_sweep",
+    "run_chunks",
+    "succeeded",
+    "summarised",
+    "sweep",
+]

@@ -17,6 +17,7 @@ time limit is a worker that dies, which costs the chunks that it was at.
 """
 
 import itertools
+import logging
 import pickle
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -33,6 +34,13 @@ LOCAL = "local"
 _PATIENCE = "15s"
 # chunks on their way for each thread of the cluster: enough that none waits, few enough that memory is bounded
 _AHEAD = 3
+# settings of this process that every worker takes over, and those that one on the same machine can
+_SAME = ("jax_enable_x64",)
+_CACHE = (
+    "jax_compilation_cache_dir",
+    "jax_persistent_cache_min_compile_time_secs",
+    "jax_persistent_cache_min_entry_size_bytes",
+)
 
 
 def on_cluster(plan: Plan, chunks: Sequence[Chunk], address: str) -> Iterator[tuple[Chunk, Answers]]:
@@ -43,7 +51,7 @@ def on_cluster(plan: Plan, chunks: Sequence[Chunk], address: str) -> Iterator[tu
     """
     distributed = _distributed()
     with _client(distributed, address) as client:
-        plugin = _plugin(distributed, plan)
+        plugin = _plugin(distributed, plan, _SAME if address != LOCAL else (*_SAME, *_CACHE))
         client.register_plugin(plugin)
         waiting = iter(chunks)
         submit = lambda chunk: client.submit(_run_there, plugin.name, chunk, key=f"{plugin.name}-{_key(chunk)}")
@@ -68,8 +76,8 @@ def _distributed() -> Any:
 @contextmanager
 def _client(distributed: Any, address: str) -> Iterator[Any]:
     if address == LOCAL:
-        processes = {"processes": True, "threads_per_worker": 1, "dashboard_address": None}
-        with distributed.LocalCluster(**processes) as cluster, distributed.Client(cluster) as client:
+        settings = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.ERROR}
+        with distributed.LocalCluster(processes=True, **settings) as cluster, distributed.Client(cluster) as client:
             yield client
         return
     try:
@@ -81,17 +89,18 @@ def _client(distributed: Any, address: str) -> Iterator[Any]:
         yield client
 
 
-def _plugin(distributed: Any, plan: Plan) -> Any:
+def _plugin(distributed: Any, plan: Plan, settings: Sequence[str]) -> Any:
     """What every worker does as it joins, those that take the place of a dead one included."""
 
     class Prepared(distributed.WorkerPlugin):
         def __init__(self) -> None:
             self.name = f"jaxsub-sweep-{name_of(described(plan))[:16]}"
-            self.double = bool(jax.config.jax_enable_x64)
+            self.settings = {name: getattr(jax.config, name) for name in settings}
             self.packed = pickle.dumps(plan)
 
         def setup(self, worker: Any) -> None:
-            jax.config.update("jax_enable_x64", self.double)
+            for name, value in self.settings.items():
+                jax.config.update(name, value)
             self.plan = pickle.loads(self.packed)
 
     return Prepared()

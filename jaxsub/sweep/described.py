@@ -30,8 +30,15 @@ def described(plan: Plan) -> dict[str, Any]:
         "vehicles": {name: vehicle_text(vehicle) for name, vehicle in plan.vehicles.items()},
         "recordings": {name: {r.name: digest(r) for r in recorded} for name, recorded in plan.recordings.items()},
         "precision": str(np.dtype(jax.numpy.result_type(float))),
-        "versions": {package: metadata.version(package) for package in _PACKAGES},
+        "versions": {package: _version(package) for package in _PACKAGES},
     }
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:  # a checkout on the path that nobody installed
+        return "not installed"
 
 
 def digest(recording: Recording) -> str:

@@ -76,7 +76,9 @@ class Plan:
         if len(set(self.noise)) < len(self.noise) or any(not 0 <= seed < 2**31 for seed in (*self.noise, self.seed)):
             raise InputError("sweep: seeds", "are not different numbers from 0 to 2³¹ - 1", "give others")
         if self.method not in METHODS:
-            remedy = f"did you mean {nearest(self.method, METHODS)}?" if nearest(self.method, METHODS) else "see METHODS"
+            remedy = (
+                f"did you mean {nearest(self.method, METHODS)}?" if nearest(self.method, METHODS) else "see METHODS"
+            )
             raise InputError("sweep: method", f"there is no {self.method!r}", remedy)
 
     @property

@@ -39,13 +39,8 @@ class Store:
 
         **Raises** `InputError`, and leaves the folder as it is, where that holds another plan or something else.
         """
-        wanted = described(plan)
-        kept = kept_plan(folder)
+        kept, wanted = check_folder(folder, plan), described(plan)
         if kept is not None:
-            told = difference(kept["plan"], wanted)
-            if told:
-                what = f"holds another sweep: {told}"
-                raise InputError(str(folder), what, "choose another --out, or add --overwrite to begin anew")
             settled = dataclasses.replace(plan, sigma=kept["layout"]["sigma"], width=kept["layout"]["width"])
             return cls(folder, name_of(wanted)), settled
         settled = plan.settled()
@@ -83,6 +78,16 @@ class Store:
                 return held.attrs["plan"] == self.name and held.sizes["cell"] == chunk.last - chunk.first
         except _UNREADABLE:
             return False
+
+
+def check_folder(folder: Path, plan: Plan) -> dict[str, Any] | None:
+    """What `kept_plan` gives. Raises `InputError` also where `folder` holds another plan than `plan`."""
+    kept = kept_plan(folder)
+    told = difference(kept["plan"], described(plan)) if kept is not None else None
+    if told:
+        what = f"holds another sweep: {told}"
+        raise InputError(str(folder), what, "choose another --out, or add --overwrite to begin anew")
+    return kept
 
 
 def kept_plan(folder: Path) -> dict[str, Any] | None:
