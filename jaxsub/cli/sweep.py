@@ -56,15 +56,15 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
         out.unlink(missing_ok=True)
     done = [0, 0]
     try:
-        with session.counted(f"sweeping {', '.join(plan.vehicles)}") as told:
+        with session.counted(f"sweeping {', '.join(plan.vehicles)}") as tell:
 
             def progress(count: int, total: int) -> None:
                 done[:] = count, total
-                told(count, total)
+                tell(count, total)
 
             dataset = run_sweep(plan, out, cluster=asked.cluster, progress=progress)
-        with session.progress("summarising") as told:
-            told("basins and figures")
+        with session.progress("summarising") as say:
+            say("basins and figures")
             summary = summarised(plan, dataset)
             _write(summary, dataset, out)
     except KeyboardInterrupt as stop:

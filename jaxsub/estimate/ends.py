@@ -1,8 +1,5 @@
 """What is said of the ends of many searches at once: how sure each estimate is, and whether it is one."""
 
-import dataclasses
-from typing import Any
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -31,28 +28,28 @@ class Ends(eqx.Module):
 
 def ends(problem: Problem, found: Found, outputs: Float[Array, "n r k c"] | None = None) -> Ends:
     """What `evaluate` says of a `Fit`, of every search that `found` holds. Not to be called in `jit`."""
-    told = in_shares(_told, None, problem, found.y, outputs)
-    return dataclasses.replace(told, result=_judged(problem, told, found.result))
+    theta, errors, away = in_shares(_told, None, problem, found.y, outputs)
+    return Ends(theta, errors, away, _judged(problem, theta, away, found.result))
 
 
 @eqx.filter_jit
-def _told(method: Any, problem: Problem, y: Float[Array, "n d"], outputs: Array | None) -> Ends:
+def _told(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array | None) -> tuple[Array, Array, Array]:
     of, p = problems(problem, outputs), len(problem.prior_mean)
 
-    def one(part: tuple[Array, Array]) -> Ends:
+    def one(part: tuple[Array, Array]) -> tuple[Array, Array, Array]:
         index, y = part
         at = of(index).expand(y)
         covariance = inverse_information(at.hessian)
         away = jnp.max(standard_errors_away(covariance, at.gradient)[:p], initial=0.0)
         theta, slope = jax.jvp(problem.transform.to_physical, (y[:p],), (jnp.ones(p),))
         errors = jnp.abs(slope) * jnp.sqrt(jnp.diag(covariance)[:p])
-        return Ends(theta, errors, away, RESULTS.successful)
+        return theta, errors, away
 
     return jax.lax.map(one, (jnp.arange(len(y)), y), batch_size=lanes_for(problem))
 
 
 @eqx.filter_jit
-def _judged(problem: Problem, told: Ends, result: RESULTS) -> RESULTS:
+def _judged(problem: Problem, theta: Float[Array, "n p"], away: Float[Array, " n"], result: RESULTS) -> RESULTS:
     names = [row.name for row in problem.vehicle.layout.free]
     vehicle = lambda theta: problem.vehicle.with_values(dict(zip(names, theta, strict=True)))
-    return jax.vmap(lambda theta, away, result: judged(vehicle(theta), away, result))(told.theta, told.away, result)
+    return jax.vmap(lambda theta, away, result: judged(vehicle(theta), away, result))(theta, away, result)

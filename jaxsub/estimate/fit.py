@@ -203,7 +203,7 @@ def standard_errors_away(covariance: Float[Array, "p p"], gradient: Float[Array,
 
 
 def judged(vehicle: AbstractVehicle, away: Float[Array, ""], result: RESULTS) -> RESULTS:
-    """`result`, unless the fitted inertia is not positive definite or the end is 0.1 standard errors from an optimum."""
+    """`result`, unless the inertia is not positive definite or the end is 0.1 standard errors off an optimum."""
     inertia = vehicle.mass_matrix()
     definite = jnp.all(jnp.linalg.eigvalsh(0.5 * (inertia + inertia.T)) > 0.0)
     result = RESULTS.where((result == RESULTS.successful) & ~(away < 0.1), RESULTS.not_stationary, result)

@@ -5,7 +5,7 @@ import dataclasses
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
@@ -73,10 +73,11 @@ class Iterative(AbstractMethod):
         return in_shares(_pooled, self, problem, starts, outputs)
 
 
-Program = Callable[[Any, Problem, Array, Array | None], Found]
+T = TypeVar("T")
+Program = Callable[[Any, Problem, Array, Array | None], T]
 
 
-def in_shares(program: Program, method: Any, problem: Problem, starts: Array, outputs: Array | None) -> Found:
+def in_shares(program: Program[T], method: Any, problem: Problem, starts: Array, outputs: Array | None) -> T:
     """`program(method, problem, starts, outputs)` in shares of one size, over all local devices or, if one, all cores.
 
     Where a share begins depends on neither, so the same start meets the same program with the same neighbours and ends
@@ -91,16 +92,16 @@ def in_shares(program: Program, method: Any, problem: Problem, starts: Array, ou
     cut = lambda a: fill(a).reshape(-1, len(devices) * size, *a.shape[1:])
     rounds = zip(cut(starts), [None] * shares if outputs is None else cut(outputs), strict=False)
     if len(devices) > 1:
-        parts = [_over_devices(program, method, problem, *part) for part in rounds]
+        parts = [_over_devices(program, method, problem, y, z) for y, z in rounds]
     else:
-        own = lambda part: jax.block_until_ready(program(method, problem, *part))
+        own = lambda part: jax.block_until_ready(program(method, problem, part[0], part[1]))
         with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
             parts = list(threads.map(own, rounds))
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:count], *parts)
 
 
 @eqx.filter_jit
-def _over_devices(program: Program, method: Any, problem: Problem, starts: Array, outputs: Array | None) -> Found:
+def _over_devices(program: Callable, method: Any, problem: Problem, starts: Array, outputs: Array | None) -> Any:
     """One share on each local device; none waits for another before the end."""
     mesh, each, same = Mesh(np.array(jax.local_devices()), ("share",)), PartitionSpec("share"), PartitionSpec()
     numbers, rest = eqx.partition((method, problem), eqx.is_array)

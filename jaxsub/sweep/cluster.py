@@ -110,7 +110,8 @@ def _run_there(name: str, chunk: Chunk) -> tuple[Chunk, Answers]:
     """A task: the chunk, by the plan that the worker was given."""
     from distributed import get_worker
 
-    return chunk, run_chunks(get_worker().plugins[name].plan, [chunk])[0]
+    prepared: Any = get_worker().plugins[name]
+    return chunk, run_chunks(prepared.plan, [chunk])[0]
 
 
 def _key(chunk: Chunk) -> str:

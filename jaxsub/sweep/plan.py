@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..discrepancy.batch import batch
-from ..errors import InputError, nearest
+from ..errors import InputError
 from ..estimate import METHODS, Problem, scattered_by_number, search, share_for
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
@@ -44,7 +44,7 @@ class Plan:
 
     - `vehicles`: by name; each one's own values are where its starts are drawn about.
     - `recordings`: sets by name; those in one set are fitted together.
-    - `starts`: how many initial guesses. `spread`: each coefficient is drawn uniformly within ± this share of its value.
+    - `starts`: how many initial guesses. `spread`: each coefficient is drawn within ± this share of its value.
     - `noise`: seeds. Each stands for a recording of its own: the outputs in `recordings`, which then have to be
       without noise (`synthetic(..., noise=False)`, `answered`), plus white noise of each channel's sigma. Where there
       is no seed the outputs are taken as they are.
@@ -76,10 +76,7 @@ class Plan:
         if len(set(self.noise)) < len(self.noise) or any(not 0 <= seed < 2**31 for seed in (*self.noise, self.seed)):
             raise InputError("sweep: seeds", "are not different numbers from 0 to 2³¹ - 1", "give others")
         if self.method not in METHODS:
-            remedy = (
-                f"did you mean {nearest(self.method, METHODS)}?" if nearest(self.method, METHODS) else "see METHODS"
-            )
-            raise InputError("sweep: method", f"there is no {self.method!r}", remedy)
+            raise InputError("sweep: method", f"there is no {self.method!r}", f"choose among {', '.join(METHODS)}")
 
     @property
     def cases(self) -> list[tuple[str, str]]:

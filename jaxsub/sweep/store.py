@@ -99,8 +99,9 @@ def kept_plan(folder: Path) -> dict[str, Any] | None:
         return None
     try:
         content = json.loads((folder / PLAN).read_text(encoding="utf-8"))
-        content["plan"]["starts"], content["layout"]["width"]
-        return content
+        if {"plan", "layout"} <= set(content):
+            return content
+        raise KeyError("plan")
     except (OSError, ValueError, KeyError, TypeError) as error:
         what = f"exists and is no folder of a sweep: it has no {PLAN} that can be read"
         raise InputError(str(folder), what, "choose another --out, or add --overwrite") from error

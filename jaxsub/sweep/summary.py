@@ -4,6 +4,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+import optimistix as optx
 import xarray
 
 from ..estimate import MARGIN, Found, Rate, basins
@@ -72,9 +73,9 @@ def _basins(plan: Plan, index: int, case: xarray.Dataset) -> tuple[list, int]:
     problem, count = plan.problems[index], min(plan.starts, _SORTED)
     first = case.isel(noise=0, start=slice(count))
     y = np.asarray(first.coordinates)[:, : len(problem.coordinates())]
-    told = [jnp.asarray(np.asarray(values)) for values in (y, first.cost, first.evaluations)]
+    cost, evaluations = (jnp.asarray(np.asarray(values)) for values in (first.cost, first.evaluations))
     own = problems(problem, plan.outputs(index, np.arange(1)))(jnp.asarray(0))
-    return basins(own, Found(*told, RESULTS.successful))
+    return basins(own, Found(jnp.asarray(y), cost, evaluations, RESULTS.promote(optx.RESULTS.successful)))
 
 
 def _coefficients(rows: list, case: xarray.Dataset, best: np.ndarray) -> dict[str, Any]:
