@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from ..estimate import METHODS, Problem, ends, share_for
 from ..results import RESULTS
@@ -55,8 +57,8 @@ def run_chunks(plan: Plan, chunks: Sequence[Chunk]) -> list[Answers]:
     return [{name: values[own] for name, values in whole.items()} for own in inside]
 
 
-def _physical(problem: Problem, starts: jnp.ndarray) -> jnp.ndarray:
-    return problem.transform.to_physical(starts[:, : len(problem.prior_mean)])
+def _physical(problem: Problem, starts: Float[Array, "n d"]) -> Float[Array, "n p"]:
+    return jax.vmap(problem.transform.to_physical)(starts[:, : len(problem.prior_mean)])
 
 
 def _outcomes(result: RESULTS) -> np.ndarray:

@@ -1,0 +1,140 @@
+"""`jaxsub sweep` goes on where a killed one stopped, takes no other plan's folder, and writes what it says."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+from sweep_cases import environment, farthest, files
+
+from jaxsub.cli import main
+from jaxsub.sweep import open_sweep
+
+RUN = [sys.executable, "-c", "from jaxsub.cli import main; main()"]
+OPTIONS = ["--starts", "640", "--spread", "0.8"]
+
+
+def command(monkeypatch, capsys, *arguments):
+    """The command in this process: its exit code and what it said."""
+    monkeypatch.setattr("sys.argv", ["jaxsub", *arguments])
+    monkeypatch.setattr("jaxsub.cli.session.start", lambda: None)
+    try:
+        main()
+        code = 0
+    except SystemExit as stop:
+        code = stop.code
+    return code, capsys.readouterr().err
+
+
+def kept(folder):
+    return {path.name: path.stat().st_mtime_ns for path in (folder / "cells").glob("case*.nc")}
+
+
+def killed_in_the_middle(arguments, folder, cache):
+    """Start the command, kill it once two chunks are kept, and give what it had done."""
+    process = subprocess.Popen([*RUN, *arguments, *OPTIONS], env=environment(cache), stderr=subprocess.DEVNULL)
+    try:
+        for _ in range(3000):
+            if len(kept(folder)) >= 2 or process.poll() is not None:
+                break
+            time.sleep(0.02)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    return kept(folder)
+
+
+@pytest.fixture(scope="module")
+def resumed(tmp_path_factory):
+    """The folder of a sweep that was killed, what it had then, and its files."""
+    folder = tmp_path_factory.mktemp("resumed")
+    arguments = files(folder)
+    before = killed_in_the_middle(arguments, folder / "out", folder / "cache")
+    return folder, arguments, before
+
+
+def test_a_killed_sweep_does_only_what_is_missing(resumed, monkeypatch, capsys):
+    folder, arguments, before = resumed
+    assert 2 <= len(before) < 10
+    code, said = command(monkeypatch, capsys, *arguments, *OPTIONS)
+    assert code == 0, said
+    after = kept(folder / "out")
+    assert len(after) == 10
+    assert before.items() <= after.items()
+    code, again = command(monkeypatch, capsys, *arguments, *OPTIONS)
+    assert code == 0 and kept(folder / "out") == after
+    assert "640 of 640" in again
+    whole = [*arguments[:-1], str(folder / "whole")]
+    assert command(monkeypatch, capsys, *whole, *OPTIONS)[0] == 0
+    assert farthest(open_sweep(folder / "whole"), open_sweep(folder / "out")) <= 1e-9
+    assert not list((folder / "out").rglob(".*"))
+
+
+def test_it_writes_and_says_what_it_found(resumed, monkeypatch, capsys):
+    folder, arguments, _ = resumed
+    code, said = command(monkeypatch, capsys, *arguments, *OPTIONS)
+    told = json.loads((folder / "out" / "sweep.json").read_text(encoding="utf-8"))
+    rate = told["cases"][0]["success"]
+    assert code == 0 and told["done"] == 640
+    assert f"{rate['successes']} of {rate['count']} searches reach the least cost known" in said
+    assert "basins found" in said and "K_x" in said
+    cost = open_sweep(folder / "out").cost.values.ravel()
+    assert rate["successes"] == np.sum(cost < np.nanmin(cost) + 0.1)
+    with Image.open(folder / "out" / "figures" / "sweep-vehicle-all.png") as image:
+        assert image.format == "PNG" and len(image.convert("RGB").getcolors(maxcolors=1 << 24)) > 10
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [(["--starts", "641", "--spread", "0.8"], "starts is 640 there and 641 here"), ([*OPTIONS, "--seed", "2"], "seed")],
+)
+def test_another_plan_is_refused_and_the_folder_left_alone(resumed, monkeypatch, capsys, options, word):
+    folder, arguments, _ = resumed
+    before = {path: path.stat().st_mtime_ns for path in (folder / "out").rglob("*")}
+    code, said = command(monkeypatch, capsys, *arguments, *options)
+    assert code == 2 and said.count("\n") == 1
+    assert word in said and "--overwrite" in said
+    assert {path: path.stat().st_mtime_ns for path in (folder / "out").rglob("*")} == before
+
+
+def test_a_folder_that_is_no_sweep_is_refused_unless_it_may_go(tmp_path, monkeypatch, capsys):
+    arguments = files(tmp_path)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine.txt").write_text("keep", encoding="utf-8")
+    code, said = command(monkeypatch, capsys, *arguments, "--starts", "3")
+    assert code == 2 and said.count("\n") == 1 and "plan.json" in said
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine.txt"]
+    assert command(monkeypatch, capsys, *arguments, "--starts", "3", "--overwrite")[0] == 0
+    assert not (tmp_path / "out" / "mine.txt").exists()
+
+
+def test_axes_of_the_command_line(tmp_path, monkeypatch, capsys):
+    arguments = files(tmp_path)
+    for source, name in (("vehicle.toml", "other.toml"), ("run.csv", "run2.csv")):
+        (tmp_path / name).write_bytes((tmp_path / source).read_bytes())
+    more = ["--vehicle", str(tmp_path / "other.toml"), str(tmp_path / "run2.csv"), "--apart", "--noise-seeds", "2"]
+    code, said = command(monkeypatch, capsys, *arguments, *more, "--starts", "2")
+    assert code == 0, said
+    found = open_sweep(tmp_path / "out")
+    assert found.vehicle.values.tolist() == ["vehicle", "other"]
+    assert found.recording.values.tolist() == ["run", "run2"]
+    assert found.noise.values.tolist() == [0, 1]
+    assert "spread over noise" in said
+    assert len(list((tmp_path / "out" / "figures").iterdir())) == 4
+
+
+def test_an_interrupt_says_what_is_kept(tmp_path, monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr("jaxsub.sweep.execute.on_this_machine", stopped)
+    code, said = command(monkeypatch, capsys, *files(tmp_path), "--starts", "3")
+    assert code == 1
+    assert f"0 of 3 are kept in {tmp_path / 'out'}" in said.splitlines()[-1]
+    assert os.path.exists(tmp_path / "out" / "plan.json")
