@@ -48,12 +48,11 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
     session.start()
     refuse_existing(out, True)
     plan = make_plan(asked)
-    if not overwrite:
-        check_folder(out, plan)
-    elif out.is_dir():
-        shutil.rmtree(out)
+    if overwrite:
+        plan = plan.settled()
+        _remove(out)
     else:
-        out.unlink(missing_ok=True)
+        check_folder(out, plan)
     done = [0, 0]
     try:
         with session.counted(f"sweeping {', '.join(plan.vehicles)}") as tell:
@@ -74,6 +73,13 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
     for case in summary["cases"]:
         _show(case)
     session.console.print(f"{summary['done']} searches in {out}", highlight=False, markup=False)
+
+
+def _remove(out: Path) -> None:
+    if out.is_dir():
+        shutil.rmtree(out)
+    else:
+        out.unlink(missing_ok=True)
 
 
 def make_plan(asked: Asked) -> Plan:

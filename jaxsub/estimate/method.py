@@ -70,7 +70,7 @@ class Iterative(AbstractMethod):
         self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
     ) -> Found:
         """All starts through pools of lanes. Not to be called in `jit`."""
-        return in_shares(_pooled, self, problem, starts, outputs)
+        return in_shares(pooled, self, problem, starts, outputs)
 
 
 T = TypeVar("T")
@@ -111,7 +111,8 @@ def _over_devices(program: Callable, method: Any, problem: Problem, starts: Arra
 
 
 @eqx.filter_jit
-def _pooled(method: Iterative, problem: Problem, starts: Array, outputs: Array | None) -> Found:
+def pooled(method: Iterative, problem: Problem, starts: Array, outputs: Array | None) -> Found:
+    """A search from each of the starts, `lanes_for` at a time."""
     of, lanes = problems(problem, outputs), lanes_for(problem)
     ends = pool(method.solver, objective, starts, of, lanes=lanes, max_steps=method.max_steps)
     # without a value at the very start there is nothing that a search could have done
@@ -142,8 +143,13 @@ def costs(of: Callable[[Any], Problem], y: Float[Array, "n d"], lanes: int) -> F
 
 def lanes_for(problem: Problem) -> int:
     """How many searches may share the memory at once."""
+    return int(max(1, min(_LANES, _MEMORY / bytes_of_a_lane(problem))))
+
+
+def bytes_of_a_lane(problem: Problem) -> int:
+    """What one search takes at once: its whitened Jacobian, some copies of it."""
     columns = len(problem.prior_mean) + len(problem.spread) + 1
-    return int(max(1, min(_LANES, _MEMORY / (8 * _COPIES * problem.runs.outputs.size * columns))))
+    return 8 * _COPIES * problem.runs.outputs.size * columns
 
 
 def share_for(problem: Problem) -> int:

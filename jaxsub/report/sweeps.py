@@ -1,5 +1,6 @@
 """The figure of a sweep: how high the searches ended, and where."""
 
+import math
 import re
 from typing import Any
 
@@ -7,10 +8,11 @@ import numpy as np
 import xarray
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from ..sweep import succeeded
 from .drawing import BASELINE, GREY, IMPROVED, PALE, Picture, drawable, new_figure, plain_ticks, png, style
-from .text import percent
+from .text import percent, power_of_ten
 
 _LOWEST = 1e-6  # rises of cost below it are rounding
 _MOST_COEFFICIENTS, _MOST_POINTS, _REACH = 14, 400, 2.0
@@ -58,7 +60,9 @@ def _waterfall(axes: Axes, case: xarray.Dataset, told: dict[str, Any]) -> None:
     axes.set_yscale("log")
     axes.set_ylim(_LOWEST / 2.0, 4.0 * max(float(height.max(initial=1.0)), 1.0))
     axes.set_xlim(0, len(rise) + 1)
-    plain_ticks(axes, x=True, y=True)
+    plain_ticks(axes, x=True)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(round(math.log10(value)))))
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.set_xlabel(f"searches, the lowest first ({len(rise) - len(order)} without an end)")
     axes.set_ylabel("cost above the least known")
     axes.set_title(f"{percent(told['success']['share'])} succeed (dotted: the margin)")
@@ -96,6 +100,6 @@ def _places(axes: Axes, case: xarray.Dataset, names: list[str]) -> None:
         low = min(low, np.nanmin(ends, initial=1.0))
     axes.set_yticks(range(len(names)), [drawable(name, 32) for name in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
-    axes.set_xlabel(f"coefficient over its value in the file (ends beyond ±{_REACH:g} are drawn there)")
+    axes.set_xlabel(f"coefficient / its value in the file (ends farther than {_REACH:g} from 1 drawn there)")
     axes.set_title("where they ended")
     plain_ticks(axes, x=True)

@@ -44,7 +44,8 @@ class Plan:
 
     - `vehicles`: by name; each one's own values are where its starts are drawn about.
     - `recordings`: sets by name; those in one set are fitted together.
-    - `starts`: how many initial guesses. `spread`: each coefficient is drawn within ± this share of its value.
+    - `starts`: how many initial guesses. `spread`: each coefficient is drawn within ± this share of its value,
+      so that one of zero stays there.
     - `noise`: seeds. Each stands for a recording of its own: the outputs in `recordings`, which then have to be
       without noise (`synthetic(..., noise=False)`, `answered`), plus white noise of each channel's sigma. Where there
       is no seed the outputs are taken as they are.

@@ -41,7 +41,7 @@ def test_every_search_is_where_scipy_ends_from_the_same_start(done):
 def test_a_search_says_what_a_fit_says(done):
     _, found = done
     alone = fit(vehicle(), batch(vehicle(), recordings()))
-    best = found.isel(vehicle=0, recording=0, noise=0).isel(start=int(found.cost.argmin()))
+    best = found.isel(vehicle=0, recording=0, noise=0, start=int(np.argmin(found.cost.values)))
     np.testing.assert_allclose(float(best.cost), float(alone.cost), rtol=1e-7)
     for name, value in alone.values.items():
         error = alone.standard_errors[name]
