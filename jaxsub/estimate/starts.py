@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -98,7 +99,7 @@ def basins(problem: Problem, found: Found) -> tuple[list[Basin], int]:
     if not len(finite):
         return [], lost
     order = finite[np.argsort(cost[finite])]
-    curvature = np.asarray(problem.expand(jnp.asarray(y[order[0]])).hessian)
+    curvature = np.asarray(_curvature(problem, jnp.asarray(y[order[0]])))
     values, vectors = np.linalg.eigh(curvature)
     whitened = (y[order] - y[order[0]]) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     label = np.ones(1, int)
@@ -106,3 +107,8 @@ def basins(problem: Problem, found: Found) -> tuple[list[Basin], int]:
         label = hierarchy.fcluster(hierarchy.linkage(whitened, "single"), _REACH, "distance")
     found_in = {basin: np.flatnonzero(label == basin) for basin in dict.fromkeys(label.tolist())}
     return [Basin(float(cost[order[i[0]]]), len(i), y[order[i[0]]]) for i in found_in.values()], lost
+
+
+@eqx.filter_jit
+def _curvature(problem: Problem, y: Float[Array, " d"]) -> Float[Array, "d d"]:
+    return problem.expand(y).hessian

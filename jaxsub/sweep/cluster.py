@@ -16,9 +16,7 @@ or print `cluster.scheduler_address` and leave it running for `jaxsub sweep … 
 time limit is a worker that dies, which costs the chunks that it was at.
 """
 
-import itertools
 import logging
-import pickle
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -26,14 +24,11 @@ from typing import Any
 import jax
 
 from ..errors import InputError
-from .described import described, name_of
 from .plan import Chunk, Plan
-from .run import Answers, run_chunks
+from .run import Answers
 
 LOCAL = "local"
 _PATIENCE = "15s"
-# chunks on their way for each thread of the cluster: enough that none waits, few enough that memory is bounded
-_AHEAD = 3
 # settings of this process that every worker takes over, and those that one on the same machine can
 _SAME = ("jax_enable_x64",)
 _CACHE = (
@@ -50,18 +45,17 @@ def on_cluster(plan: Plan, chunks: Sequence[Chunk], address: str) -> Iterator[tu
     for a chunk that four workers died of.
     """
     distributed = _distributed()
+    from .worker import Prepared, run_there
+
     with _client(distributed, address) as client:
-        plugin = _plugin(distributed, plan, _SAME if address != LOCAL else (*_SAME, *_CACHE))
+        settings = _SAME if address != LOCAL else (*_SAME, *_CACHE)
+        plugin = Prepared(plan, {name: getattr(jax.config, name) for name in settings})
         client.register_plugin(plugin)
-        waiting = iter(chunks)
-        submit = lambda chunk: client.submit(_run_there, plugin.name, chunk, key=f"{plugin.name}-{_key(chunk)}")
-        ahead = _AHEAD * max(1, sum(client.nthreads().values()))
-        running = distributed.as_completed([submit(chunk) for chunk in itertools.islice(waiting, ahead)])
-        for future in running:
+        # all at once, so that a cluster that grows with its work sees how much there is
+        submitted = [client.submit(run_there, plugin.name, chunk, pure=False) for chunk in chunks]
+        for future in distributed.as_completed(submitted):
             yield future.result()
             future.release()
-            for chunk in itertools.islice(waiting, 1):
-                running.add(submit(chunk))
         client.unregister_worker_plugin(plugin.name)
 
 
@@ -87,32 +81,3 @@ def _client(distributed: Any, address: str) -> Iterator[Any]:
         raise InputError(f"--cluster {address}", "no scheduler answers there", remedy) from error
     with client:
         yield client
-
-
-def _plugin(distributed: Any, plan: Plan, settings: Sequence[str]) -> Any:
-    """What every worker does as it joins, those that take the place of a dead one included."""
-
-    class Prepared(distributed.WorkerPlugin):
-        def __init__(self) -> None:
-            self.name = f"jaxsub-sweep-{name_of(described(plan))[:16]}"
-            self.settings = {name: getattr(jax.config, name) for name in settings}
-            self.packed = pickle.dumps(plan)
-
-        def setup(self, worker: Any) -> None:
-            for name, value in self.settings.items():
-                jax.config.update(name, value)
-            self.plan = pickle.loads(self.packed)
-
-    return Prepared()
-
-
-def _run_there(name: str, chunk: Chunk) -> tuple[Chunk, Answers]:
-    """A task: the chunk, by the plan that the worker was given."""
-    from distributed import get_worker
-
-    prepared: Any = get_worker().plugins[name]
-    return chunk, run_chunks(prepared.plan, [chunk])[0]
-
-
-def _key(chunk: Chunk) -> str:
-    return f"{chunk.case}-{chunk.first}"

@@ -30,8 +30,13 @@ def described(plan: Plan) -> dict[str, Any]:
         "vehicles": {name: vehicle_text(vehicle) for name, vehicle in plan.vehicles.items()},
         "recordings": {name: {r.name: digest(r) for r in recorded} for name, recorded in plan.recordings.items()},
         "precision": str(np.dtype(jax.numpy.result_type(float))),
-        "versions": {package: _version(package) for package in _PACKAGES},
+        "versions": versions(),
     }
+
+
+def versions() -> dict[str, str]:
+    """Of the packages that the answers depend on, here."""
+    return {package: _version(package) for package in _PACKAGES}
 
 
 def _version(package: str) -> str:

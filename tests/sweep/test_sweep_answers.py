@@ -85,14 +85,14 @@ def test_summary_counts_successes_basins_and_failures(done):
 
 def test_searches_that_fail_are_masked_and_counted(tmp_path):
     # starts over the whole sky: some springs push, and the answer leaves every bound
-    wild = plan(spread=4e3, starts=48, width=[48])
+    wild = plan(spread=4e3)
     found = sweep(wild, tmp_path / "out")
     (case,) = summarised(wild, found)["cases"]
     lost = ~np.isfinite(found.cost.values)
     assert lost.any() and case["without_an_end"] == lost.sum()
-    assert case["success"]["count"] == 48 > case["success"]["successes"]
+    assert case["success"]["count"] == 96 > case["success"]["successes"]
     assert set(case["outcomes"]) - {"successful"} <= set(OUTCOMES)
-    assert sum(case["outcomes"].values()) == 48
+    assert sum(case["outcomes"].values()) == 96
 
 
 def test_noise_drawn_anew_scatters_estimates_as_their_standard_errors_say(tmp_path):
