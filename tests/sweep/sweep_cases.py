@@ -4,6 +4,7 @@ import functools
 import os
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from rigs import driven, oscillator
@@ -45,9 +46,11 @@ def files(folder: Path) -> list[str]:
 
 
 def environment(cache: Path, **more: str) -> dict[str, str]:
-    """For processes of their own, which find this checkout and keep their compiled programs in `cache`."""
-    root = str(Path(__file__).parents[2])
-    return os.environ | {"PYTHONPATH": root, "XDG_CACHE_HOME": str(cache), "JAX_PLATFORMS": "cpu"} | more
+    """For processes of their own: they find this checkout, and the command keeps its compiled programs in `cache`."""
+    root, shared = str(Path(__file__).parents[2]), jax.config.jax_compilation_cache_dir
+    compiled = {"JAX_COMPILATION_CACHE_DIR": shared, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.3"}
+    found = {"PYTHONPATH": root, "XDG_CACHE_HOME": str(cache), "JAX_PLATFORMS": "cpu"}
+    return os.environ | found | (compiled if shared else {}) | more
 
 
 def farthest(one, other):

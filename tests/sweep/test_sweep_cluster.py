@@ -3,6 +3,8 @@
 import os
 import signal
 import socket
+import threading
+import time
 
 import jax
 import pytest
@@ -24,26 +26,38 @@ def cluster(tmp_path_factory, monkeypatch):
         yield started
 
 
+class Killer(threading.Thread):
+    """Freezes a worker while it is at a chunk, waits until another chunk is kept, and kills it."""
+
+    def __init__(self, cluster):
+        super().__init__(daemon=True)
+        self.cluster, self.kept, self.done_then, self.at = cluster, threading.Event(), None, ()
+
+    def run(self):
+        with distributed.Client(self.cluster) as client:
+            pids = client.run(os.getpid)
+            while not self.at:
+                time.sleep(0.02)
+                worker, self.at = max(client.processing().items(), key=lambda item: len(item[1]))
+            os.kill(pids[worker], signal.SIGSTOP)
+            self.kept.wait(timeout=300.0)
+            os.kill(pids[worker], signal.SIGKILL)
+
+    def progress(self, done, total):
+        if done and not self.kept.is_set():
+            self.done_then = done
+            self.kept.set()
+
+
 def test_a_worker_killed_in_the_middle_costs_nothing(cluster, tmp_path):
-    killed = []
-
-    def kill_one(done, total):
-        """Once the first chunk is kept, kill the process of a worker that is at another."""
-        if killed or not 0 < done < total:
-            return
-        with distributed.Client(cluster) as client:
-            at = {worker: keys for worker, keys in client.processing().items() if keys}
-            worker = next(iter(at))
-            killed.append((done, client.run(os.getpid, workers=[worker])[worker]))
-        os.kill(killed[0][1], signal.SIGKILL)
-
-    found = sweep(plan(), tmp_path / "out", cluster=cluster.scheduler_address, progress=kill_one)
-    ((done, pid),) = killed
-    assert done < 96
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
+    alone = sweep(plan(), tmp_path / "alone")
+    killer = Killer(cluster)
+    killer.start()
+    found = sweep(plan(), tmp_path / "out", cluster=cluster.scheduler_address, progress=killer.progress)
+    killer.join(timeout=60.0)
+    assert not killer.is_alive() and killer.at and killer.done_then == 16
     assert bool(found.done.all())
-    assert farthest(sweep(plan(), tmp_path / "alone"), found) <= 1e-9
+    assert farthest(alone, found) <= 1e-9
 
 
 def test_no_scheduler_is_said_in_one_line(tmp_path, monkeypatch):
