@@ -22,11 +22,11 @@ class FinLimits(eqx.Module):
 
     **Fields**
 
-    - `amplitude`: rad, infinite for none. `rate`: rad/s, infinite for none.
+    - `amplitude`: rad, infinite for none. `rate`: rad/s, infinite for none. Those of several fins may be one array.
     """
 
-    amplitude: Float[Array, ""]
-    rate: Float[Array, ""]
+    amplitude: Float[Array, " *m"]
+    rate: Float[Array, " *m"]
 
     @classmethod
     def of(cls, amplitude: float = AMPLITUDE, rate: float = RATE) -> "FinLimits":
@@ -37,8 +37,8 @@ class FinLimits(eqx.Module):
         return cls(number(float(amplitude)), number(float(rate)))
 
     def apply(
-        self, command: Float[Array, ""], previous: Float[Array, ""], dt: Float[Array, ""] | float
-    ) -> Float[Array, ""]:
+        self, command: Float[Array, " *m"], previous: Float[Array, " *m"], dt: Float[Array, ""] | float
+    ) -> Float[Array, " *m"]:
         """The deflection (rad) that a `command` becomes `dt` s after the deflection `previous`."""
         reach = self.rate * dt
         return jnp.clip(jnp.clip(command, previous - reach, previous + reach), -self.amplitude, self.amplitude)

@@ -4,6 +4,7 @@ from .actuator_curves import ActuatorDeadband, ActuatorMisalignment, ActuatorSat
 from .actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
 from .base import (
     AbstractActuator,
+    AbstractCurve,
     AbstractEffect,
     AbstractForce,
     AbstractSensor,
@@ -54,6 +55,7 @@ __all__ = [
     "VELOCITIES",
     "VOCABULARY",
     "AbstractActuator",
+    "AbstractCurve",
     "AbstractEffect",
     "AbstractForce",
     "AbstractMemory",

@@ -9,11 +9,11 @@ from jaxtyping import Array, Float
 
 from ..parameters import number
 from .actuators import PARTS
-from .base import AbstractActuator, amplitude, shape
+from .base import AbstractCurve, amplitude, shape
 from .motion import Facts
 
 
-class ActuatorSaturation(AbstractActuator):
+class ActuatorSaturation(AbstractCurve):
     r"""A stop: $|\delta| \le \delta_{max}$, $\delta_{max} > 0$ in the actuator's unit. Source: Fossen (2021), §9.5."""
 
     name: ClassVar[str] = "actuator-saturation"
@@ -32,12 +32,12 @@ class ActuatorSaturation(AbstractActuator):
         """The limit."""
         return f"|{self.actuator}| <= limit"
 
-    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+    def bend(self, command: Float[Array, " *k"]) -> Float[Array, " *k"]:
         """The limited deflection."""
-        return jnp.clip(nodes, -self.limit, self.limit)
+        return jnp.clip(command, -self.limit, self.limit)
 
 
-class ActuatorDeadband(AbstractActuator):
+class ActuatorDeadband(AbstractCurve):
     r"""A command too small to move anything is lost: $\delta = \mathrm{sign}(\delta_{cmd})\max(|\delta_{cmd}| - d, 0)$.
 
     $d > 0$ in the actuator's unit.
@@ -60,12 +60,12 @@ class ActuatorDeadband(AbstractActuator):
         """The band."""
         return f"{self.actuator} = sign(command) max(|command| - d, 0)"
 
-    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+    def bend(self, command: Float[Array, " *k"]) -> Float[Array, " *k"]:
         """What is left of the command."""
-        return nodes - jnp.clip(nodes, -self.d, self.d)
+        return command - jnp.clip(command, -self.d, self.d)
 
 
-class ActuatorMisalignment(AbstractActuator):
+class ActuatorMisalignment(AbstractCurve):
     r"""A control surface that is mounted or zeroed askew: $\delta = \delta_{cmd} + b$ in rad, of either sign.
 
     Source: Fossen (2021), §9.4; a constant force of the fin, so a rival of an asymmetric hull.
@@ -86,12 +86,12 @@ class ActuatorMisalignment(AbstractActuator):
         """The offset."""
         return f"{self.actuator} = command + b"
 
-    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+    def bend(self, command: Float[Array, " *k"]) -> Float[Array, " *k"]:
         """The offset deflection."""
-        return nodes + self.b
+        return command + self.b
 
 
-class ControlSurfaceStall(AbstractActuator):
+class ControlSurfaceStall(AbstractCurve):
     r"""A fin whose lift falls off at large deflections: it acts as one of $\delta - k\delta^3$, $k \ge 0$ in 1/rad².
 
     The first term of a lift curve that bends over; the inflow angle of the hull is left out.
@@ -113,6 +113,6 @@ class ControlSurfaceStall(AbstractActuator):
         """The bent lift curve."""
         return f"{self.actuator} acts as command - k command³"
 
-    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+    def bend(self, command: Float[Array, " *k"]) -> Float[Array, " *k"]:
         """The deflection that would have the same lift without stall."""
-        return nodes - self.k * nodes**3
+        return command - self.k * command**3

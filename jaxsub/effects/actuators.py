@@ -4,6 +4,7 @@ An actuator does not feel the vehicle, so its answer is a function of the comman
 before the vehicle is integrated, at the start, middle and end of every sample interval.
 """
 
+import math
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -50,16 +51,22 @@ class ActuatorLag(AbstractActuator):
 
     def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
         """The lagged deflection; the actuator starts at rest at its first command."""
+        return _followed(self, times, nodes, nodes[:1, 0])
+
+    def remembered(self, interval: float) -> int:
+        """The deflection."""
+        return 1
+
+    def advance(
+        self, memory: Float[Array, " m"], nodes: Float[Array, "3"], interval: Float[Array, ""]
+    ) -> tuple[Float[Array, " m"], Float[Array, "3"]]:
+        """The deflection fades towards the command."""
         # over half an interval, and squared: a square root has no derivative where a short lag has faded to zero
-        decay = jnp.exp(-0.5 * jnp.diff(times) / jnp.maximum(self.T, 1e-6))
-
-        def interval(held: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
-            command, fade = step
-            start, end = held, command + (held - command) * fade**2
-            middle = command + (held - command) * fade
-            return end, jnp.stack([start, middle, end])
-
-        return jax.lax.scan(interval, nodes[0, 0], (nodes[:, 0], decay))[1]
+        fade = jnp.exp(-0.5 * interval / jnp.maximum(self.T, 1e-6))
+        held, command = memory[0], nodes[0]
+        start, end = held, command + (held - command) * fade**2
+        middle = command + (held - command) * fade
+        return end[None], jnp.stack([start, middle, end])
 
 
 class ActuatorDelay(AbstractActuator):
@@ -95,6 +102,18 @@ class ActuatorDelay(AbstractActuator):
         mean = jnp.diff(shifted) / jnp.diff(times)
         return jnp.broadcast_to(mean[:, None], nodes.shape)
 
+    def remembered(self, interval: float) -> int:
+        """The commands of the dead time, whole intervals of it."""
+        return math.ceil(max(float(self.tau), 0.0) / interval)
+
+    def advance(
+        self, memory: Float[Array, " m"], nodes: Float[Array, "3"], interval: Float[Array, ""]
+    ) -> tuple[Float[Array, " m"], Float[Array, "3"]]:
+        """The last interval of a record that begins with the commands remembered."""
+        commands = jnp.concatenate([memory, nodes[:1]])
+        times = interval * jnp.arange(len(commands) + 1, dtype=nodes.dtype)
+        return commands[1:], self.respond(times, jnp.broadcast_to(commands[:, None], (len(commands), 3)))[-1]
+
 
 class ActuatorRateLimit(AbstractActuator):
     r"""Limited rate: $|\dot\delta| \le R$, $R > 0$ in the actuator's unit per s.
@@ -126,18 +145,22 @@ class ActuatorRateLimit(AbstractActuator):
 
     def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
         """The limited deflection."""
-        most = jnp.maximum(self.rate, 1e-9) * jnp.diff(times)
+        return _followed(self, times, nodes, _mean(nodes[0])[None])
 
-        def interval(held: Array, step: tuple[Array, Array]) -> tuple[Array, Array]:
-            command, reach = step
-            moved = jnp.clip(command - held, -reach, reach)
-            part = jnp.minimum(jnp.abs(command - held) / reach, 1.0)  # of the interval, until the command is reached
-            mean, slope = held + moved * (1.0 - 0.5 * part), moved * part * (3.0 - 2.0 * part)
-            return held + moved, jnp.stack([mean - 0.5 * slope, mean, mean + 0.5 * slope])
+    def remembered(self, interval: float) -> int:
+        """The deflection."""
+        return 1
 
-        # an actuator before this one may have bent the command: its mean is what counts
-        commands = nodes @ jnp.array([1.0, 4.0, 1.0]) / 6.0
-        return jax.lax.scan(interval, commands[0], (commands, most))[1]
+    def advance(
+        self, memory: Float[Array, " m"], nodes: Float[Array, "3"], interval: Float[Array, ""]
+    ) -> tuple[Float[Array, " m"], Float[Array, "3"]]:
+        """The deflection goes towards the command's mean: an actuator before this one may have bent it."""
+        held, reach = memory[0], jnp.maximum(self.rate, 1e-9) * interval
+        ahead = _mean(nodes) - held
+        moved = jnp.clip(ahead, -reach, reach)
+        part = jnp.minimum(jnp.abs(ahead) / reach, 1.0)  # of the interval, until the command is reached
+        mean, slope = held + moved * (1.0 - 0.5 * part), moved * part * (3.0 - 2.0 * part)
+        return (held + moved)[None], jnp.stack([mean - 0.5 * slope, mean, mean + 0.5 * slope])
 
 
 class ActuatorBacklash(AbstractActuator):
@@ -164,10 +187,31 @@ class ActuatorBacklash(AbstractActuator):
 
     def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
         """The deflection behind the play."""
-        gap = jnp.maximum(self.b, 0.0)
+        return _followed(self, times, nodes, nodes[:1, 0])
 
-        def follow(held: Array, command: Array) -> tuple[Array, Array]:
-            after = jnp.clip(held, command - gap, command + gap)
-            return after, after
+    def remembered(self, interval: float) -> int:
+        """The deflection."""
+        return 1
 
-        return jax.lax.scan(follow, nodes[0, 0], nodes.ravel())[1].reshape(nodes.shape)
+    def advance(
+        self, memory: Float[Array, " m"], nodes: Float[Array, "3"], interval: Float[Array, ""]
+    ) -> tuple[Float[Array, " m"], Float[Array, "3"]]:
+        """The deflection is taken along by the command."""
+        gap, held, after = jnp.maximum(self.b, 0.0), memory[0], []
+        for command in nodes:
+            held = jnp.clip(held, command - gap, command + gap)
+            after.append(held)
+        return held[None], jnp.stack(after)
+
+
+def _followed(
+    effect: AbstractActuator, times: Float[Array, " k"], nodes: Float[Array, "k1 3"], memory: Float[Array, " m"]
+) -> Float[Array, "k1 3"]:
+    """What an actuator does that goes on from one interval to the next, from its `memory` at the start."""
+    on = lambda held, part: effect.advance(held, *part)
+    return jax.lax.scan(on, memory, (nodes, jnp.diff(times)))[1]
+
+
+def _mean(nodes: Float[Array, "3"]) -> Float[Array, ""]:
+    """Over the interval, of the parabola through the nodes."""
+    return nodes @ jnp.array([1.0, 4.0, 1.0]) / 6.0

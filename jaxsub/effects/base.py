@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 import equinox as eqx
 from jaxtyping import Array, ArrayLike, Float
 
+from ..errors import InputError
 from ..parameters import Parameter, number
 from .motion import Facts, Motion, Signal
 
@@ -97,10 +98,42 @@ class AbstractActuator(AbstractEffect):
     def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
         """What the actuator does at the start, middle and end of each sample interval, given the command there."""
 
+    def remembered(self, interval: float) -> int:
+        """How many numbers it carries from one sample to the next, `interval` s apart; each starts at the command."""
+        return 0
+
+    def advance(
+        self, memory: Float[Array, " m"], nodes: Float[Array, "3"], interval: Float[Array, ""]
+    ) -> tuple[Float[Array, " m"], Float[Array, "3"]]:
+        """What `respond` says of one interval given what it remembers, and what it remembers after it.
+
+        **Raises** `InputError` where an effect does not say.
+        """
+        remedy = "let its class derive from AbstractCurve if it has no memory, else define remembered and advance"
+        raise InputError(self.label, "does not say how it goes on from one sample to the next", remedy)
+
     @property
     def where(self) -> tuple[str, ...]:
         """The actuator."""
         return (f"input:{self.actuator}",)
+
+
+class AbstractCurve(AbstractActuator):
+    """An actuator whose deflection is a function of the command at the same time."""
+
+    @abc.abstractmethod
+    def bend(self, command: Float[Array, " *k"]) -> Float[Array, " *k"]:
+        """The deflection."""
+
+    def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
+        """The deflections."""
+        return self.bend(nodes)
+
+    def advance(
+        self, memory: Float[Array, " m"], nodes: Float[Array, "3"], interval: Float[Array, ""]
+    ) -> tuple[Float[Array, " m"], Float[Array, "3"]]:
+        """The deflections; there is nothing to remember."""
+        return memory, self.bend(nodes)
 
 
 class AbstractSensor(AbstractEffect):
@@ -117,6 +150,17 @@ class AbstractSensor(AbstractEffect):
 
         Leading axes of `outputs` and `motion` follow those of `times`, the last of which is time.
         """
+
+    def remembered(self, interval: float) -> int:
+        """How many earlier true samples of its channel, `interval` s apart, `measure` has to see.
+
+        A plant shows it these and the present one, at times counted from the present.
+
+        **Raises** `InputError` where one that `remembers` does not say.
+        """
+        if self.remembers:
+            raise InputError(self.label, "does not say how many samples it remembers", "define remembered")
+        return 0
 
     def undone(self, times: Float[Array, " *k"], recorded: Float[Array, " *k"]) -> Float[Array, " *k"]:
         """`recorded`, of one run, brought to the times at which it was true; only what `remembers` has to say how."""

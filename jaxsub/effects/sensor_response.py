@@ -1,5 +1,6 @@
 """Sensor effects that are not linear in the output: late, cut off, or without its sign."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -42,6 +43,10 @@ class SensorDelay(AbstractSensor):
         """The output a while ago."""
         late = jnp.vectorize(jnp.interp, signature="(k),(k),(k)->(k)")
         return late(times - jnp.maximum(self.tau, 0.0), times, jnp.asarray(outputs[self.channel]))
+
+    def remembered(self, interval: float) -> int:
+        """The samples of the delay."""
+        return math.ceil(max(float(self.tau), 0.0) / interval)
 
     def undone(self, times: Float[Array, " *k"], recorded: Float[Array, " *k"]) -> Float[Array, " *k"]:
         """What was shown a while later."""

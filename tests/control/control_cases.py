@@ -3,8 +3,22 @@
 import numpy as np
 
 from jaxsub.control import Autopilot, fly
+from jaxsub.effects import (
+    EQUATIONS,
+    CrossflowDrag,
+    Current,
+    FluidMemory,
+    SensorBias,
+    SensorDelay,
+    SensorDrift,
+    WaveForcing,
+)
+from jaxsub.effects.actuator_curves import ActuatorSaturation
+from jaxsub.effects.actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
+from jaxsub.parameters import number
 from jaxsub.simulate import at_rest
 from jaxsub.vehicle import vehicle_from
+from jaxsub.vehicle.catalogue import nps_auv_ii
 
 TIMES = 0.25 * np.arange(401)
 
@@ -34,3 +48,24 @@ def body(dof, coefficients, inputs, **more):
         "coefficients": coefficients, "inputs": inputs, "outputs": {n: {"sigma": 0.01} for n in "rqpz"},
     }  # fmt: skip
     return vehicle_from(data | more, "body.toml")
+
+
+def concealing():
+    """The NPS AUV with an actuator that remembers and sensors that mislead."""
+    vehicle = nps_auv_ii().with_effect(ActuatorLag("rudder", number(0.5)))
+    return vehicle.with_effect(SensorBias("z", number(0.5))).with_effect(SensorDrift("r", number(1e-4)))
+
+
+def remembering():
+    """The NPS AUV with everything that carries something from sample to sample."""
+    vehicle = nps_auv_ii()
+    effects = [
+        ActuatorSaturation("rudder", number(0.09)), ActuatorDelay("rudder", number(0.4)),
+        ActuatorLag("rudder", number(0.5)), FluidMemory("sway", number(-200.0), number(1.5)),
+        ActuatorRateLimit("elevator_right", number(0.2)), ActuatorBacklash("elevator_left", number(0.01)),
+        SensorDelay("psi", number(0.6)), CrossflowDrag("horizontal", 5.3, 0.7, number(0.6)),
+        WaveForcing("heave", number(40.0), number(10.0), number(0.9)), Current(EQUATIONS, number(0.2), number(-0.1)),
+    ]  # fmt: skip
+    for effect in effects:
+        vehicle = vehicle.with_effect(effect)
+    return vehicle

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from control_cases import TIMES, flown, held
+from control_cases import TIMES, concealing, flown, held
 
 from jaxsub.control import Autopilot, FinLimits, fly
-from jaxsub.effects.actuators import ActuatorLag
 from jaxsub.effects.sensors import SensorBias, SensorDrift
 from jaxsub.errors import InputError
 from jaxsub.parameters import number
@@ -14,12 +13,6 @@ from jaxsub.simulate import at_rest, prbs, sampled_states, synthetic
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii, remus_100
 
 WANTED = {"depth": np.where(TIMES < 40.0, 4.0, 1.0), "course_rate": np.where(TIMES < 20.0, 0.08, -0.05)}
-
-
-def concealing():
-    """The NPS AUV with an actuator that remembers and sensors that mislead."""
-    vehicle = nps_auv_ii().with_effect(ActuatorLag("rudder", number(0.5)))
-    return vehicle.with_effect(SensorBias("z", number(0.5))).with_effect(SensorDrift("r", number(1e-4)))
 
 
 @pytest.mark.parametrize("make", [nps_auv_ii, concealing])
