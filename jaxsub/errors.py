@@ -15,6 +15,16 @@ class InputError(ValueError):
         super().__init__(" ".join(f"{where}: {what}; {remedy}".split()))
 
 
+def require_known(kind: str, names: Iterable[str], known: Iterable[str], owner: str) -> None:
+    """Every one of `names` is `known` to `owner`. **Raises** `InputError` with a hint for the first that is not."""
+    known = tuple(known)
+    for name in names:
+        if name not in known:
+            close = nearest(name, known)
+            remedy = f"did you mean {close!r}?" if close else f"there are {', '.join(known)}"
+            raise InputError(f"{kind} {name!r}", f"{owner} has none", remedy)
+
+
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return the entry of `known` spelt most like `word`, or None when nothing is close."""
     by_lower = {entry.lower(): entry for entry in known}

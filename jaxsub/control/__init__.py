@@ -1,10 +1,16 @@
-"""Control: limits of the fins, autopilots, closed-loop flights, the paper's scenarios, and the plant for controllers."""
+"""Control: fins, autopilots, closed-loop flights, the paper's scenarios; the sampled plant, predictive control."""
 
 from .autopilot import Autopilot, Memory
+from .bridge_casadi import casadi_jacobians, casadi_plant
+from .bridge_control import control_system, state_space
 from .closed_loop import fly
+from .export import export_plant
 from .limits import FinLimits
 from .linear import LinearPlant, linearisation_error, linearise, linearise_rates
+from .mpc import Mpc, Plan, Solved
+from .observer import observer
 from .plant import Jacobians, Plant, discretise
+from .pursuit import Pursuit, pursue
 from .scenarios import references, scenario_one, scenario_two
 from .steering import CourseRate, Depth, Roll
 from .trim import Trim, require_trim, trim
@@ -17,17 +23,28 @@ __all__ = [
     "Jacobians",
     "LinearPlant",
     "Memory",
+    "Mpc",
+    "Plan",
     "Plant",
+    "Pursuit",
     "Roll",
+    "Solved",
     "Trim",
+    "casadi_jacobians",
+    "casadi_plant",
+    "control_system",
     "discretise",
+    "export_plant",
     "fly",
     "linearisation_error",
     "linearise",
     "linearise_rates",
+    "observer",
+    "pursue",
     "references",
     "require_trim",
     "scenario_one",
     "scenario_two",
+    "state_space",
     "trim",
 ]

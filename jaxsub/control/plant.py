@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..effects import VELOCITIES, AbstractActuator, AbstractEffect, AbstractSensor
-from ..errors import InputError, nearest
+from ..errors import InputError, require_known
 from ..filter.model import linearised
 from ..simulate import Sampled, step_table
 from ..vehicle import AbstractVehicle
@@ -194,11 +194,7 @@ def discretise(
     if not dt > 0.0:
         raise InputError(f"{layout.name}: dt", f"{dt:g} s is not positive", "give the time between samples in s")
     columns = (*layout.held, *layout.interpolated)
-    for name in given:
-        if name not in columns:
-            close = nearest(name, columns)
-            remedy = f"did you mean {close!r}?" if close else f"there are {', '.join(columns)}"
-            raise InputError(f"given column {name!r}", f"{layout.name} has none", remedy)
+    require_known("given column", given, columns, layout.name)
     for name in layout.interpolated:
         if name not in given:
             raise InputError(f"{layout.name}: column {name!r}", "is no input of a plant", f"give {name!r} a constant")

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from ..errors import InputError, nearest
+from ..errors import InputError, require_known
 from ..identifiability.design_limits import producible
 from ..simulate import at_rest
 from .plant import Plant, Time

@@ -1,0 +1,83 @@
+"""A plant compiled ahead of time: one file with the programs, names and a loader that needs only JAX."""
+
+import json
+import zipfile
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import export
+from jaxtyping import Array, Float
+
+from ..errors import InputError
+from ..simulate import at_rest
+from .plant import Plant
+from .plant_loader import PROGRAMS
+
+SCHEMA = 1
+
+
+def export_plant(
+    plant: Plant,
+    path: Path,
+    *,
+    x: Float[Array, " s"] | None = None,
+    u: Float[Array, " m"] | None = None,
+    platforms: Sequence[str] = ("cpu", "cuda"),
+) -> None:
+    """Write `plant` to the file `path`: StableHLO of its step, outputs and Jacobians with the vehicle's numbers in it.
+
+    The file is a zip archive: `plant.json` (names, `dt`, the vehicle's numbers, SI), each of `plant_loader.PROGRAMS` as
+    `jax.export` serialises it, and `plant_loader.py`, by which a machine with JAX alone calls them, with
+    `flatbuffers`, by which JAX reads them. It does so for at least six months after its version; step and outputs keep one
+    derivative. `x` and `u` are a state and inputs to start from, such as a trim; by default rest at the operating speed.
+
+    **Raises** `InputError` where the folder of `path` is not there, or flatbuffers is not installed.
+    """
+    path = Path(path)
+    if not path.parent.is_dir():
+        raise InputError(str(path), "its folder is not there", "make it first")
+    u = jnp.zeros(len(plant.inputs), plant.constants.dtype) if u is None else u
+    x = plant.start(at_rest(plant.vehicle, 1)[0].astype(u.dtype), u) if x is None else x
+    layout = plant.vehicle.layout
+    about = {
+        "schema": SCHEMA,
+        "name": layout.name,
+        "dt": plant.dt,
+        "states": plant.states,
+        "inputs": plant.inputs,
+        "outputs": plant.outputs,
+        "dtype": str(np.asarray(x).dtype),
+        "start": np.asarray(x).tolist(),
+        "trim": np.asarray(u).tolist(),
+        "effects": [effect.label for effect in plant.vehicle.effects],
+        "values": {name: float(value) for name, value in plant.vehicle.values().items()},
+        "jax": jax.__version__,
+        "platforms": list(platforms),
+    }
+    shapes = [jax.ShapeDtypeStruct(np.shape(part), x.dtype) for part in (x, u, 0.0)]
+    brought = _flatbuffers()
+    loader = resources.files(__package__).joinpath("plant_loader.py").read_text(encoding="utf-8")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("plant.json", json.dumps(about, indent=1))
+        for name, text in {"plant_loader.py": loader, **brought}.items():
+            archive.writestr(name, text)
+        for name in PROGRAMS:
+            method = getattr(plant, name)
+            program = export.export(
+                jax.jit(lambda x, u, t, f=method: jax.tree.leaves(f(x, u, t))), platforms=list(platforms)
+            )(*shapes)
+            archive.writestr(f"{name}.bin", bytes(program.serialize(vjp_order=0 if name == "jacobians" else 1)))
+
+
+def _flatbuffers() -> dict[str, str]:
+    """The modules of flatbuffers, which is plain Python, by their names in the archive."""
+    try:
+        folder = resources.files("flatbuffers")
+    except ModuleNotFoundError as error:
+        raise InputError("flatbuffers", "is not installed", "pip install 'jaxsub[control]'") from error
+    found = {f"flatbuffers/{part.name}": part for part in folder.iterdir() if part.name.endswith(".py")}
+    return {name: part.read_text(encoding="utf-8") for name, part in found.items()}

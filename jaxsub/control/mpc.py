@@ -1,0 +1,162 @@
+"""Predictive control: the inputs over a horizon that bring channels to their references within limits."""
+
+from collections.abc import Mapping
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Bool, Float, Int
+
+from ..errors import InputError, require_known
+from ..identifiability.design_limits import producible
+from .limits import FinLimits
+from .mpc_problem import Task, Weights
+from .plant import Plant
+from .sequential import Sequential
+from .trim import require_trim, trim
+
+_ANGLES = ("phi", "theta", "psi")
+# m and rad: as large as an operator would forgive
+_SCALE = {"z": 0.5, "psi": 0.09}
+
+
+class Plan(eqx.Module):
+    """What the controller remembers from sample to sample.
+
+    **Fields**
+
+    - `nodes`: (d,) the inputs it planned, in their amplitudes. `last`: (m,) the inputs that it gave, SI.
+    """
+
+    nodes: Float[Array, " d"]
+    last: Float[Array, " m"]
+
+
+class Solved(eqx.Module):
+    """How a sample's problem was solved.
+
+    **Fields**
+
+    - `cost`: J of the plan. `promised`: what another step would gain, in parts of 1 + J.
+    - `passed`: the most by which it passes a limit of inputs and of channels, in parts of the limit; zero where it does
+      not. `steps`: how many it took.
+    - `finite`: whether the prediction is; if not, the inputs stay what they were.
+    """
+
+    cost: Float[Array, ""]
+    promised: Float[Array, ""]
+    passed: Float[Array, "2"]
+    steps: Int[Array, ""]
+    finite: Bool[Array, ""]
+
+
+class Mpc(eqx.Module):
+    """A predictive controller on a plant.
+
+    Each sample it minimises J of `mpc_problem` over the inputs ahead, from the last plan one sample on, and gives the
+    first of them. A plan keeps the limits of inputs and rates at every step of the search, so that one that is cut
+    short gives inputs that may be used. One program does for all samples.
+
+    **Fields**
+
+    - `plant`, `weights`, `nodes`: as in `Task`.
+    - `tolerance`: the gain, in parts of 1 + J, below which a search ends; `most`: steps after which it does.
+    """
+
+    plant: Plant
+    weights: Weights
+    nodes: tuple[int, ...] = eqx.field(static=True)
+    tolerance: float = eqx.field(static=True)
+    most: int = eqx.field(static=True)
+
+    @classmethod
+    def of(
+        cls,
+        plant: Plant,
+        track: Mapping[str, float] | None = None,
+        within: Mapping[str, tuple[float, float]] | None = None,
+        *,
+        limits: FinLimits | None = None,
+        horizon: float = 15.0,
+        free: int = 8,
+        effort: float = 0.5,
+        pace: float = 0.5,
+        give: float = 1e-4,
+        tolerance: float = 1e-4,
+        steps: int = 8,
+    ) -> "Mpc":
+        """A controller that brings the channels `track` to their references over a `horizon` in s.
+
+        `track` gives the deviation of each that costs one for a second, SI, by default 0.5 m of `z` and 0.09 rad of
+        `psi`, those that the plant has. `within` bounds channels, SI. All inputs have the same `limits`, `effort` and
+        `pace`: the parts of amplitude and rate that cost one for a second. Inputs are `free` at as many samples, closer
+        together at first. The inputs of rest are those of the plant's trim. A channel that passes a limit
+        by the root of `give`, in parts of half its range, costs ½ a sample.
+
+        **Raises** `InputError` for a channel that the vehicle has not, an empty range, and a plant without trim.
+        """
+        layout = plant.vehicle.layout
+        track = {n: _SCALE[n] for n in ("z", "psi") if n in layout.positions} if track is None else track
+        within = {} if within is None else within
+        require_known("mpc: channel", (*track, *within), producible(plant.vehicle), layout.name)
+        for name, (low, high) in within.items():
+            if not low < high:
+                raise InputError(f"mpc: within {name!r}", f"{low:g} to {high:g} is empty", "give the lesser first")
+        limits = FinLimits.of() if limits is None else limits
+        count = max(round(horizon / plant.dt), 2)
+        nodes = tuple(int(n) for n in np.unique(np.round(np.geomspace(1.0, count, free)) - 1.0))
+        m, kind = len(plant.inputs), plant.constants.dtype
+        full = lambda value: jnp.full(m, value, kind)
+        amplitude, rate = full(limits.amplitude), full(limits.rate)
+        columns = lambda values: jnp.asarray(list(values), kind)
+        weights = Weights(
+            tuple(track), columns(track.values()), effort * amplitude, pace * rate, require_trim(plant, trim(plant)).u,
+            amplitude, rate, tuple(within), columns(low for low, _ in within.values()),
+            columns(high for _, high in within.values()), jnp.asarray(give, kind),
+            tuple(name in _ANGLES for name in track),
+        )  # fmt: skip
+        return cls(plant, weights, nodes, tolerance, steps)
+
+    @property
+    def samples(self) -> int:
+        """Samples of the horizon."""
+        return self.nodes[-1] + 1
+
+    def start(self, inputs: Float[Array, " m"]) -> Plan:
+        """Before the first sample, the inputs being `inputs`."""
+        return Plan(jnp.tile(inputs / self.weights.amplitude, len(self.nodes)), inputs)
+
+    def task(
+        self, plan: Plan, x: Float[Array, " s"], reference: Float[Array, "n t"], time: Float[Array, ""] | float = 0.0
+    ) -> Task:
+        """The problem of one sample."""
+        return Task(self.plant, self.weights, self.nodes, x, plan.last, reference, jnp.asarray(time, x.dtype))
+
+    def command(
+        self, plan: Plan, x: Float[Array, " s"], reference: Float[Array, "n t"], time: Float[Array, ""] | float = 0.0
+    ) -> tuple[Plan, Float[Array, " m"], Solved]:
+        """The plan one sample on, the inputs to give now (SI), and how they were found.
+
+        `x` is the state, or what an observer says of it; `reference` what is wanted of the tracked channels at the
+        `samples` after this one.
+        """
+        task = self.task(plan, x, reference, time)
+        y, solved = self.solve(task, plan.nodes)
+        planned, weights = task.inputs(y), self.weights
+        limits = FinLimits(weights.amplitude, weights.rate)
+        # the search keeps the limits to its own rounding
+        u = jnp.where(solved.finite, limits.apply(planned[0], plan.last, self.plant.dt), plan.last)
+        later = jnp.minimum(jnp.array(self.nodes) + 1, self.samples - 1)
+        on = Plan((planned[later] / weights.amplitude).ravel(), u)
+        return jax.tree.map(lambda a, b: jnp.where(solved.finite, a, b), on, self.start(u)), u, solved
+
+    def solve(self, task: Task, y: Float[Array, " d"]) -> tuple[Float[Array, " d"], Solved]:
+        """The plan found from `y`, which keeps the limits of inputs and rates."""
+        solver = Sequential(Task.expand, self.tolerance)
+        found = optx.minimise(lambda y, task: task.cost(y), solver, y, task, max_steps=self.most + 1, throw=False)
+        y, cost = found.value, found.state.cost
+        passed = jnp.stack([jnp.max(g, initial=0.0) for g in task.limits(y)])
+        finite = jnp.isfinite(cost) & jnp.all(jnp.isfinite(y))
+        return y, Solved(cost, found.state.promised, passed, jnp.asarray(found.stats["num_steps"]), finite)
