@@ -1,5 +1,6 @@
 """A plant compiled ahead of time: one file with the programs, names and a loader that needs only JAX."""
 
+import inspect
 import json
 import zipfile
 from collections.abc import Sequence
@@ -14,8 +15,8 @@ from jaxtyping import Array, Float
 
 from ..errors import InputError
 from ..simulate import at_rest
+from . import plant_loader
 from .plant import Plant
-from .plant_loader import PROGRAMS
 
 SCHEMA = 1
 
@@ -31,9 +32,9 @@ def export_plant(
     """Write `plant` to the file `path`: StableHLO of its step, outputs and Jacobians with the vehicle's numbers in it.
 
     The file is a zip archive: `plant.json` (names, `dt`, the vehicle's numbers, SI), each of `plant_loader.PROGRAMS` as
-    `jax.export` serialises it, and `plant_loader.py`, by which a machine with JAX alone calls them, with
-    `flatbuffers`, by which JAX reads them. It does so for at least six months after its version; step and outputs keep one
-    derivative. `x` and `u` are a state and inputs to start from, such as a trim; by default rest at the operating speed.
+    `jax.export` serialises it, and `plant_loader.py`, by which a machine with JAX alone calls them, with the
+    `flatbuffers` by which JAX reads them. It does so for at least six months after its version; step and outputs keep
+    one derivative. `x` and `u` are a state and inputs to start from, such as a trim; by default at rest.
 
     **Raises** `InputError` where the folder of `path` is not there, or flatbuffers is not installed.
     """
@@ -60,12 +61,12 @@ def export_plant(
     }
     shapes = [jax.ShapeDtypeStruct(np.shape(part), x.dtype) for part in (x, u, 0.0)]
     brought = _flatbuffers()
-    loader = resources.files(__package__).joinpath("plant_loader.py").read_text(encoding="utf-8")
+    loader = inspect.getsource(plant_loader)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("plant.json", json.dumps(about, indent=1))
         for name, text in {"plant_loader.py": loader, **brought}.items():
             archive.writestr(name, text)
-        for name in PROGRAMS:
+        for name in plant_loader.PROGRAMS:
             method = getattr(plant, name)
             program = export.export(
                 jax.jit(lambda x, u, t, f=method: jax.tree.leaves(f(x, u, t))), platforms=list(platforms)

@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from ..errors import InputError
 from ..vehicle.base import stack
-from .plant import Plant, Time
+from .plant import Jacobians, Plant, Time
 
 
 class LinearPlant(eqx.Module):
@@ -69,14 +69,13 @@ def linearise_rates(plant: Plant, x: Float[Array, " s"], u: Float[Array, " m"], 
         return jnp.concatenate([plant.vehicle.acceleration(x, signals), positions])
 
     by_state, by_input = jax.jacfwd(rates, (0, 1))(x, u)
-    C, D = plant.jacobians(x, u, time)[2:]
-    return _named(plant, (by_state, by_input, C, D), x, u, plant.output(x, u, time), rates(x, u), 0.0)
+    shown = plant.jacobians(x, u, time)
+    return _named(plant, shown._replace(A=by_state, B=by_input), x, u, plant.output(x, u, time), rates(x, u), 0.0)
 
 
-def _named(
-    plant: Plant, matrices: tuple[Array, ...], x: Array, u: Array, y: Array, drift: Array, dt: float
-) -> LinearPlant:
-    return LinearPlant(*matrices, x, u, y, drift, dt, plant.states, plant.inputs, plant.outputs)
+def _named(plant: Plant, of: Jacobians, x: Array, u: Array, y: Array, drift: Array, dt: float) -> LinearPlant:
+    names = (plant.states, plant.inputs, plant.outputs)
+    return LinearPlant(of.A, of.B, of.C, of.D, x, u, y, drift, dt, *names)
 
 
 @eqx.filter_jit

@@ -124,8 +124,9 @@ class Task(eqx.Module):
         _, columns = jax.lax.scan(on, jnp.zeros_like(pushed[0]), (by_state, pushed))
         tracked, bounded = jax.vmap(self._channels)(states[1:], inputs)
         # a channel by an input, such as one of an actuator, is none that anybody steers by
-        slopes = jax.vmap(jax.jacfwd(self._channels))(states[1:], inputs)
-        return tracked, bounded, *(jnp.einsum("ncs,nsd->ncd", slope, columns) for slope in slopes)
+        of_tracked, of_bounded = jax.vmap(jax.jacfwd(self._channels))(states[1:], inputs)
+        chain = lambda slope: jnp.einsum("ncs,nsd->ncd", slope, columns)
+        return tracked, bounded, chain(of_tracked), chain(of_bounded)
 
     def _deviations(self, tracked: Array) -> tuple[Float[Array, "n t"], Float[Array, "n t"]]:
         """Weighted deviations from the reference, and their slopes by the channels."""

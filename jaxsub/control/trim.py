@@ -110,16 +110,8 @@ def _conditions(
         if len(full) < len(plant.inputs) and position in layout.positions and instead not in full:
             full.setdefault(name, 0.0)
     short = len(plant.inputs) - len(full)
-    known = {
-        "wanted": (*producible(plant.vehicle), *plant.inputs),
-        "at": [n for n in plant.states if _is_place(plant, n)],
-    }
-    for kind, table in (("wanted", full), ("at", at)):
-        for name in table:
-            if name not in known[kind]:
-                close = nearest(name, known[kind])
-                remedy = f"did you mean {close!r}?" if close else f"there are {', '.join(known[kind])}"
-                raise InputError(f"trim: {kind} {name!r}", f"{layout.name} has none", remedy)
+    require_known("trim: wanted", full, (*producible(plant.vehicle), *plant.inputs), layout.name)
+    require_known("trim: at", at, [name for name in plant.states if _is_place(plant, name)], layout.name)
     if short != 0:
         has = f"has {len(plant.inputs)} inputs for {len(full)} conditions ({', '.join(full) or 'none'})"
         remedy = f"want {short} more" if short > 0 else f"hold {-short} fewer, or give the plant more inputs"
