@@ -9,6 +9,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float, Int
 
+from ..effects.motion import PROPULSION
 from ..errors import InputError, require_known
 from ..identifiability.design_limits import producible
 from .limits import FinLimits
@@ -78,7 +79,7 @@ class Mpc(eqx.Module):
         track: Mapping[str, float] | None = None,
         within: Mapping[str, tuple[float, float]] | None = None,
         *,
-        limits: FinLimits | None = None,
+        limits: FinLimits | Mapping[str, FinLimits] | None = None,
         horizon: float = 15.0,
         free: int = 8,
         effort: float = 0.5,
@@ -90,12 +91,13 @@ class Mpc(eqx.Module):
         """A controller that brings the channels `track` to their references over a `horizon` in s.
 
         `track` gives the deviation of each that costs one for a second, SI, by default 0.5 m of `z` and 0.09 rad of
-        `psi`, those that the plant has. `within` bounds channels, SI. All inputs have the same `limits`, `effort` and
-        `pace`: the parts of amplitude and rate that cost one for a second. Inputs are `free` at as many samples, closer
-        together at first. The inputs of rest are those of the plant's trim. A channel that passes a limit
-        by the root of `give`, in parts of half its range, costs ½ a sample.
+        `psi`, those that the plant has. `within` bounds channels, SI; one that passes its bound by the root of `give`,
+        in parts of half the range, costs ½ a sample. `limits` are those of every fin, by default `FinLimits.of()`, or
+        one for each input by name; `effort` and `pace` the parts of amplitude and rate that cost one for a second.
+        Inputs are `free` at as many samples, closer together at first, and rest where the plant is in trim.
 
-        **Raises** `InputError` for a channel that the vehicle has not, an empty range, and a plant without trim.
+        **Raises** `InputError` for a channel that the vehicle has not, an empty range, an input without finite limits,
+        and a plant without trim.
         """
         layout = plant.vehicle.layout
         track = {n: _SCALE[n] for n in ("z", "psi") if n in layout.positions} if track is None else track
@@ -104,18 +106,15 @@ class Mpc(eqx.Module):
         for name, (low, high) in within.items():
             if not low < high:
                 raise InputError(f"mpc: within {name!r}", f"{low:g} to {high:g} is empty", "give the lesser first")
-        limits = FinLimits.of() if limits is None else limits
         count = max(round(horizon / plant.dt), 2)
         nodes = tuple(int(n) for n in np.unique(np.round(np.geomspace(1.0, count, free)) - 1.0))
-        m, kind = len(plant.inputs), plant.constants.dtype
-        full = lambda value: jnp.full(m, value, kind)
-        amplitude, rate = full(limits.amplitude), full(limits.rate)
-        columns = lambda values: jnp.asarray(list(values), kind)
+        amplitude, rate = _limits(plant, limits)
+        columns = lambda values: jnp.asarray(list(values), plant.constants.dtype)
         weights = Weights(
             tuple(track), columns(track.values()), effort * amplitude, pace * rate, require_trim(plant, trim(plant)).u,
             amplitude, rate, tuple(within), columns(low for low, _ in within.values()),
-            columns(high for _, high in within.values()), jnp.asarray(give, kind),
-            tuple(name in _ANGLES for name in track),
+            columns(high for _, high in within.values()), columns([give])[0],
+            tuple(name in _ANGLES and layout.kind == "submerged-body" for name in track),
         )  # fmt: skip
         return cls(plant, weights, nodes, tolerance, steps)
 
@@ -160,3 +159,19 @@ class Mpc(eqx.Module):
         passed = jnp.stack([jnp.max(g, initial=0.0) for g in task.limits(y)])
         finite = jnp.isfinite(cost) & jnp.all(jnp.isfinite(y))
         return y, Solved(cost, found.state.promised, passed, jnp.asarray(found.stats["num_steps"]), finite)
+
+
+def _limits(
+    plant: Plant, limits: FinLimits | Mapping[str, FinLimits] | None
+) -> tuple[Float[Array, " m"], Float[Array, " m"]]:
+    """Amplitude and rate of each input; what is given for fins is not for propulsion."""
+    whole = FinLimits.of() if limits is None else limits
+    rows = []
+    for name in plant.inputs:
+        given = whole.get(name) if isinstance(whole, Mapping) else None if name in PROPULSION else whole
+        if given is None or not bool(jnp.isfinite(given.amplitude) & jnp.isfinite(given.rate)):
+            where = f"{plant.vehicle.layout.name}: input {name!r}"
+            raise InputError(where, "has no finite limits of amplitude and rate", "give it FinLimits by its name")
+        rows.append((given.amplitude, given.rate))
+    table = jnp.asarray(rows, plant.constants.dtype).reshape(-1, 2)
+    return table[:, 0], table[:, 1]

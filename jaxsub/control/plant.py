@@ -14,6 +14,7 @@ from ..effects import VELOCITIES, AbstractActuator, AbstractEffect, AbstractSens
 from ..errors import InputError, require_known
 from ..filter.model import linearised
 from ..simulate import Sampled, step_table
+from ..simulate.exponential import StepTable
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import stack
 
@@ -34,8 +35,9 @@ class Plant(eqx.Module):
 
     The step is `Sampled.step`, that of simulation and estimation. The state is [the vehicle's, what each actuator
     remembers, what each sensor does], so that a vehicle with lags, delays, play or late sensors is a plant like any
-    other. Everything may be differentiated and is safe under jit and vmap; for derivatives by the vehicle's numbers use
-    `with_values`. Physics that follows the time is given it in s; for others it may be left out.
+    other. Everything may be differentiated and is safe under jit and vmap; `equinox.filter_jit(plant.step)` compiles
+    it. For derivatives by the vehicle's numbers use `with_values`. Physics that follows the time is given it in s; for
+    others it may be left out.
 
     **Fields**
 
@@ -208,11 +210,15 @@ def discretise(
     return plant
 
 
-@eqx.filter_jit
 def _ready(vehicle: AbstractVehicle, dt: float, substeps: int) -> Sampled:
+    return Sampled(vehicle, *_weights(vehicle, dt / substeps), substeps)
+
+
+@eqx.filter_jit
+def _weights(vehicle: AbstractVehicle, length: float) -> tuple[Array, StepTable]:
+    """The inverse inertia, and the weights of one step length in s."""
     inverse = jnp.linalg.inv(vehicle.mass_matrix())
-    table = step_table(inverse @ vehicle.damping_matrix(), jnp.full(1, dt / substeps, inverse.dtype))
-    return Sampled(vehicle, inverse, table, substeps)
+    return inverse, step_table(inverse @ vehicle.damping_matrix(), jnp.full(1, length, inverse.dtype))
 
 
 def _remembered(effect: AbstractEffect, dt: float) -> int:

@@ -14,7 +14,6 @@ from jaxtyping import Array, Float
 
 from ..errors import InputError, require_known
 from ..identifiability.design_limits import producible
-from ..simulate import at_rest
 from .plant import Plant, Time
 
 # what moves a body only through effects that follow it
@@ -58,7 +57,9 @@ def trim(
     wanted, at = _conditions(plant, wanted or {}, at or {})
     states = plant.states[: plant.own]
     moving = [i for i, name in enumerate(states) if not _is_place(plant, name)]
-    state = at_rest(plant.vehicle, 1)[0]
+    state = jnp.zeros(len(states), plant.constants.dtype)
+    if "u" in states and plant.vehicle.layout.kind == "submerged-body":
+        state = state.at[states.index("u")].set(plant.vehicle.own_values()["speed"])
     for name, value in at.items():
         state = state.at[states.index(name)].set(value)
     names = tuple(name for name in wanted if name not in plant.inputs)

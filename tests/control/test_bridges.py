@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from control_cases import concealing, remembering
+from control_cases import remembering
 
 from jaxsub.control import (
     casadi_jacobians,
@@ -26,7 +26,7 @@ from jaxsub.simulate import at_rest
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii, remus_100
 
 DT = 0.2
-MAKERS = {"nps": nps_auv_ii, "remus": remus_100, "dsrv": dsrv, "remembering": remembering, "concealing": concealing}
+MAKERS = {"nps": nps_auv_ii, "remus": remus_100, "dsrv": dsrv, "remembering": remembering}
 
 
 @pytest.fixture(scope="module", params=MAKERS)

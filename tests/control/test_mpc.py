@@ -161,5 +161,7 @@ def test_controller_of_what_is_not_there_is_refused(plant, mpc):
         Mpc.of(plant, {"heading": 0.1})
     with pytest.raises(InputError, match=r"^mpc: within 'theta': 1 to 0 is empty"):
         Mpc.of(plant, within={"theta": (1.0, 0.0)})
+    with pytest.raises(InputError, match=r"^NPS AUV II: input 'rudder': has no finite limits of amplitude and rate"):
+        Mpc.of(plant, limits=FinLimits.of(0.3, np.inf))
     with pytest.raises(InputError, match=r"references: the controller tracks z, psi; give one of each"):
         pursue(plant, mpc, {"z": np.zeros(5)}, seed=1)
