@@ -22,7 +22,7 @@ def control_system(plant: Plant, name: str | None = None) -> Any:
     step, output = (eqx.filter_jit(function) for function in (plant.step, plant.output))
 
     def called(function: Any) -> Any:
-        def at(t: float, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
+        def at(t: float | int, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
             return np.asarray(function(*(jnp.asarray(part, plant.constants.dtype) for part in (x, u, t))))
 
         return at

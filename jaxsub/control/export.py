@@ -3,9 +3,10 @@
 import inspect
 import json
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -66,12 +67,17 @@ def export_plant(
         archive.writestr("plant.json", json.dumps(about, indent=1))
         for name, text in {"plant_loader.py": loader, **brought}.items():
             archive.writestr(name, text)
-        for name in plant_loader.PROGRAMS:
-            method = getattr(plant, name)
-            program = export.export(
-                jax.jit(lambda x, u, t, f=method: jax.tree.leaves(f(x, u, t))), platforms=list(platforms)
-            )(*shapes)
+        for name, method in _programs(plant).items():
+            program = export.export(jax.jit(method), platforms=list(platforms))(*shapes)
             archive.writestr(f"{name}.bin", bytes(program.serialize(vjp_order=0 if name == "jacobians" else 1)))
+
+
+def _programs(plant: Plant) -> dict[str, Callable[[Array, Array, Array], Any]]:
+    """What is exported; a loader does not know of the type that `jacobians` gives."""
+    called = {name: getattr(plant, name) for name in plant_loader.PROGRAMS}
+    # jit needs what it can hash, which the method of a module is not
+    programs = {name: (lambda x, u, t, f=f: f(x, u, t)) for name, f in called.items()}
+    return programs | {"jacobians": lambda x, u, t: tuple(plant.jacobians(x, u, t))}
 
 
 def _flatbuffers() -> dict[str, str]:

@@ -16,7 +16,7 @@ from jaxsub.parameters import number
 from jaxsub.recording import Recording
 from jaxsub.simulate import at_rest, sampled_states, synthetic
 from jaxsub.vehicle import read_vehicle, vehicle_from, write_vehicle
-from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii, remus_100
+from jaxsub.vehicle.catalogue import nps_auv_ii, remus_100
 
 DT = 0.25
 TIMES = DT * np.arange(17)
@@ -34,7 +34,7 @@ def plant_answer(plant, run, start):
     return np.asarray(answer(inputs))
 
 
-@pytest.mark.parametrize("make", [nps_auv_ii, remus_100, dsrv, coupled, concealing, remembering])
+@pytest.mark.parametrize("make", [remus_100, coupled, remembering])
 def test_plant_stepped_is_the_simulation(make):
     vehicle = make()
     start = at_rest(vehicle, 1)
@@ -55,7 +55,7 @@ def test_improved_vehicle_read_from_its_file_is_the_same_plant(tmp_path):
     np.testing.assert_allclose(step(read), step(plant), rtol=1e-12)
 
 
-@pytest.mark.parametrize("make", [nps_auv_ii, concealing, coupled])
+@pytest.mark.parametrize("make", [concealing, coupled])
 def test_jacobians_are_those_of_finite_differences(make):
     plant = discretise(make(), DT)
     s, m = len(plant.states), len(plant.inputs)

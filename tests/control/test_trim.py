@@ -1,5 +1,6 @@
 """A trim is where the plant stays, its derivatives are those of the implicit function, and linear forms hold there."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,13 +10,14 @@ from rigs import coupled
 from scipy.linalg import expm
 from scipy.optimize import fsolve
 
-from jaxsub.control import discretise, linearisation_error, linearise, linearise_rates, require_trim, trim
+from jaxsub.control import Plant, discretise, linearisation_error, linearise, linearise_rates, require_trim, trim
 from jaxsub.effects import FluidMemory, HullAsymmetry, TrimOffset
 from jaxsub.errors import InputError
 from jaxsub.parameters import number
 from jaxsub.vehicle.catalogue import nps_auv_ii
 
 DT = 0.2
+RUN = eqx.filter_jit(Plant.run)
 
 
 def heavy():
@@ -35,8 +37,7 @@ def found(plant):
 
 
 def test_plant_stays_where_it_is_trimmed(plant, found):
-    states = jax.jit(lambda x, u: plant.run(x, u))
-    end = states(found.x, jnp.tile(found.u, (200, 1)))[-1]
+    end = RUN(plant, found.x, jnp.tile(found.u, (200, 1)))[-1]
     np.testing.assert_allclose(end, found.x, atol=1e-6)
     assert float(jnp.max(jnp.abs(found.u))) > 0.02  # it did not start there
 
@@ -62,7 +63,7 @@ def test_trim_is_the_one_that_scipy_finds_in_the_equations_of_motion(plant, foun
 
 
 def test_derivatives_of_a_trim_are_those_of_finite_differences(plant):
-    names = ("M_delta_e", "N_delta_r", "trim-offset[x].offset")
+    names = ("M_delta_e", "N_delta_r", "trim-offset[x].delta_x_B")
     values = {name: plant.vehicle.values()[name] for name in names}
     deflections = jax.jit(lambda values: trim(plant.with_values(values)).u)
     by = jax.jit(jax.jacrev(lambda values: trim(plant.with_values(values)).u))(values)
@@ -72,26 +73,24 @@ def test_derivatives_of_a_trim_are_those_of_finite_differences(plant):
         np.testing.assert_allclose(by[name] * h, (ends[0] - ends[1]) / 2.0, rtol=1e-4, atol=1e-11, err_msg=name)
 
 
-def test_speed_and_heading_rate_may_be_wanted():
-    plant = discretise(nps_auv_ii(), DT)
-    turning = require_trim(plant, trim(plant, {"heading_rate": 0.02, "depth_rate": 0.0, "phi": 0.0}))
-    x = jax.jit(lambda x, u: plant.run(x, u))(turning.x, jnp.tile(turning.u, (100, 1)))[-1]
-    psi = plant.states.index("psi")
-    assert float(x[psi] - turning.x[psi]) == pytest.approx(0.02 * 100 * DT, abs=1e-6)
+def test_turn_may_be_wanted(plant):
+    turning = require_trim(plant, trim(plant, {"depth_rate": 0.0, "heading_rate": 0.02, "phi": 0.0}))
+    x = RUN(plant, turning.x, jnp.tile(turning.u, (200, 1)))[-1]
+    psi, phi, z = (plant.states.index(name) for name in ("psi", "phi", "z"))
+    assert float(x[psi] - turning.x[psi]) == pytest.approx(0.02 * 200 * DT, abs=1e-6)
+    np.testing.assert_allclose([x[phi], x[z]], 0.0, atol=1e-6)
 
 
-def test_sampled_linear_form_is_the_exponential_of_the_continuous_one():
-    plant = discretise(nps_auv_ii(), 0.05)
-    x = jnp.asarray(0.02 * np.random.default_rng(3).standard_normal(len(plant.states))).at[0].add(1.8)
-    u = jnp.array([0.05, -0.02, 0.03])
-    still = linearise_rates(plant, x, u)
-    s, m = len(plant.states), len(plant.inputs)
+def test_sampled_linear_form_is_the_exponential_of_the_continuous_one(plant, found):
+    still, sampled = linearise_rates(plant, found.x, found.u), linearise(plant, found.x, found.u)
+    s, m = still.B.shape
     block = np.zeros((s + m, s + m))
     block[:s] = np.hstack([still.A, still.B])
-    whole = expm(plant.dt * block)
-    sampled = linearise(plant, x, u)
-    np.testing.assert_allclose(sampled.A, whole[:s, :s], atol=5e-4)  # x is no trim: A changes on the way
-    np.testing.assert_allclose(sampled.B, whole[:s, s:], atol=5e-4)
+    whole = expm(DT * block)
+    # the step is exact where damping acts, and of order four elsewhere
+    np.testing.assert_allclose(sampled.A, whole[:s, :s], atol=3e-5)
+    np.testing.assert_allclose(sampled.B, whole[:s, s:], atol=3e-5)
+    np.testing.assert_allclose(sampled.drift, 0.0, atol=1e-8)
 
 
 def test_error_of_the_linear_form_falls_with_the_square_of_the_inputs(plant, found):
@@ -108,7 +107,8 @@ def test_what_has_no_trim_or_no_rates_is_refused(plant):
     with pytest.raises(InputError, match=r"^trim: wanted 'heading': .*did you mean 'heading_rate'\?$"):
         trim(plant, {"heading": 0.0})
     with pytest.raises(InputError, match=r"^NPS AUV II: has no trim as wanted: .* is left"):
-        require_trim(plant, trim(plant, {"theta": 3.0, "heading_rate": 5.0}))
+        rudderless = plant.with_values({"N_delta_r": jnp.zeros(()), "Y_delta_r": jnp.zeros(())})
+        require_trim(rudderless, trim(rudderless))
     lagging = discretise(concealing(), DT)
     with pytest.raises(InputError, match=r"keeps samples \(rudder_held_0\); linearise its step instead$"):
         linearise_rates(lagging, jnp.zeros(len(lagging.states)), jnp.zeros(3))
