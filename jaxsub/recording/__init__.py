@@ -1,7 +1,18 @@
 """Recordings: one run's samples, the files they are read from and written to, and their division in time."""
 
 from jaxsub.recording.files import load, save
+from jaxsub.recording.frames import from_pandas, from_xarray, to_pandas, to_xarray
 from jaxsub.recording.recording import Recording
 from jaxsub.recording.split import hold_out, split
 
-__all__ = ["Recording", "hold_out", "load", "save", "split"]
+__all__ = [
+    "Recording",
+    "from_pandas",
+    "from_xarray",
+    "hold_out",
+    "load",
+    "save",
+    "split",
+    "to_pandas",
+    "to_xarray",
+]

@@ -2,7 +2,6 @@
 
 import csv
 import os
-import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -10,16 +9,14 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import pandas
 import xarray
 from pyarrow import parquet
 
-from jaxsub.errors import InputError, nearest
+from jaxsub.errors import InputError
+from jaxsub.recording.frames import Table, numeric, recorded, to_pandas, to_xarray, variables
 from jaxsub.recording.recording import FIRST_ROW, Recording
-from jaxsub.units import TIME, si_columns
 
-Samples = dict[str, np.ndarray]  # by header, in the file's own units
-Table = list[tuple[str, np.ndarray]]  # the same as read, when a header may still occur twice
+Units = Mapping[str, str]
 
 
 def load(path: str | os.PathLike[str]) -> Recording:
@@ -31,15 +28,10 @@ def load(path: str | os.PathLike[str]) -> Recording:
     read, _ = _format(path)
     if not path.is_file():
         raise InputError(str(path), "is a folder" if path.is_dir() else "no such file", "give the path of a recording")
-    columns = si_columns(str(path), read(path))
-    if TIME not in columns:
-        similar = next((name for name in columns if "time" in name.lower()), nearest(TIME, columns))
-        remedy = f"rename {similar!r} to {TIME!r}" if similar else f"add a column headed {TIME}[s]"
-        raise InputError(str(path), f"has no time column {TIME!r}", remedy)
-    return Recording(path.stem, columns.pop(TIME), columns, str(path))
+    return recorded(read(path), path.stem, str(path))
 
 
-def save(recording: Recording, path: str | os.PathLike[str], units: Mapping[str, str] | None = None) -> None:
+def save(recording: Recording, path: str | os.PathLike[str], units: Units | None = None) -> None:
     """Write a .csv, .parquet or .nc file, in SI but for the columns that `units` names a unit for.
 
     A save that fails leaves an older file as it was. Raises InputError for an unknown extension, column or unit, a
@@ -47,16 +39,16 @@ def save(recording: Recording, path: str | os.PathLike[str], units: Mapping[str,
     """
     path = Path(path)
     _, write = _format(path)
-    samples = recording.in_units(units or {})
+    recording.in_units(units or {})  # refuses a wrong unit before anything is written
     try:
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".jaxsub-") as folder:
-            write(Path(folder) / path.name, samples)
+            write(Path(folder) / path.name, recording, units or {})
             os.replace(Path(folder) / path.name, path)
     except OSError as error:
         raise InputError(str(path), f"cannot be written ({error.strerror or error})", "check its folder") from error
 
 
-def _format(path: Path) -> tuple[Callable[[Path], Table], Callable[[Path, Samples], None]]:
+def _format(path: Path) -> tuple[Callable[[Path], Table], Callable[[Path, Recording, Units], None]]:
     if found := _FORMATS.get(path.suffix.lower()):
         return found
     raise InputError(str(path), f"unknown extension {path.suffix!r}", f"use {', '.join(_FORMATS)}")
@@ -97,19 +89,19 @@ def _numbers(path: Path, header: str, cells: list[str]) -> np.ndarray:
     return values
 
 
-def _write_csv(path: Path, samples: Samples) -> None:
-    pandas.DataFrame(samples).to_csv(path, index=False)
+def _write_csv(path: Path, recording: Recording, units: Units) -> None:
+    to_pandas(recording, units).to_csv(path, index=False)
 
 
 def _read_parquet(path: Path) -> Table:
     with _reading(path, "Parquet"), parquet.ParquetFile(path) as file:
         table = file.read()
         columns = [column.to_numpy() for column in table.columns]
-    return [(name, _numeric(path, name, values)) for name, values in zip(table.column_names, columns, strict=True)]
+    return [(name, numeric(str(path), name, values)) for name, values in zip(table.column_names, columns, strict=True)]
 
 
-def _write_parquet(path: Path, samples: Samples) -> None:
-    pandas.DataFrame(samples).to_parquet(path, index=False)
+def _write_parquet(path: Path, recording: Recording, units: Units) -> None:
+    to_pandas(recording, units).to_parquet(path, index=False)
 
 
 def _read_netcdf(path: Path) -> Table:
@@ -117,30 +109,12 @@ def _read_netcdf(path: Path) -> Table:
     with _reading(path, "NetCDF 4"), h5py.File(path) as file:
         file.attrs.get("_nc3_strict")
     with _reading(path, "NetCDF 4"), xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
-        variables = file.load().variables
-    table = []
-    for name, variable in variables.items():
-        bare = "units" in variable.attrs and "[" not in str(name)
-        header = f"{name}[{variable.attrs['units']}]" if bare else str(name)
-        table.append((header, _numeric(path, str(name), variable.to_numpy())))
-    return table
+        dataset = file.load()
+    return variables(dataset, str(path))
 
 
-def _write_netcdf(path: Path, samples: Samples) -> None:
-    dataset = xarray.Dataset()
-    for header, values in samples.items():
-        name, _, unit = header.rstrip("]").partition("[")
-        if not re.fullmatch(r"\w[^/\x00-\x1f\x7f]*", name):
-            raise InputError(f"column {name!r}", "is a name that NetCDF cannot hold", "rename it or write a .csv file")
-        dataset[name] = xarray.Variable(TIME, values, {"units": unit} if unit else {})
-    dataset.to_netcdf(path, engine="h5netcdf")
-
-
-def _numeric(path: Path, header: str, values: np.ndarray) -> np.ndarray:
-    if values.dtype.kind not in "biuf" or values.ndim != 1:
-        what = f"holds {values.ndim}-dimensional {values.dtype} data"
-        raise InputError(f"{path}, column {header!r}", what, "give one number a sample or leave the column out")
-    return values.astype(np.float64)
+def _write_netcdf(path: Path, recording: Recording, units: Units) -> None:
+    to_xarray(recording, units).to_netcdf(path, engine="h5netcdf")
 
 
 _FORMATS = {

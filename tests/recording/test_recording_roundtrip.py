@@ -105,7 +105,7 @@ def test_failed_save_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch):
     save(make(), path)
     before = path.read_bytes()
 
-    def write_half(target, samples):
+    def write_half(target, recording, units):
         target.write_text("t,r\n0.0,")
         raise OSError(28, "No space left on device")
 
