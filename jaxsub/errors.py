@@ -1,7 +1,9 @@
 """The one error a user can cause, and the hint that goes with a misspelt word."""
 
 import difflib
+import importlib
 from collections.abc import Iterable
+from typing import Any
 
 
 class InputError(ValueError):
@@ -30,3 +32,12 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     by_lower = {entry.lower(): entry for entry in known}
     matches = difflib.get_close_matches(word.lower(), by_lower, n=1)
     return by_lower[matches[0]] if matches else None
+
+
+def optional(module: str, extra: str, purpose: str) -> Any:
+    """Import `module`, which the extra `extra` installs. Raises InputError, saying what installs it, where absent."""
+    try:
+        return importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        what = f"needs the package {(error.name or module).partition('.')[0]}, which is not installed"
+        raise InputError(purpose, what, f"pip install 'jaxsub[{extra}]'") from error

@@ -91,7 +91,7 @@ def si_columns(source: str, table: Iterable[tuple[str, np.ndarray]]) -> dict[str
     """
     headers, columns = {}, {}
     for header, values in table:
-        name, unit = _split_header(header)
+        name, unit = split_header(header)
         if name in headers:
             what = f"headers {headers[name]!r} and {header!r} name one column"
             raise InputError(source, what, "rename or delete one")
@@ -100,7 +100,8 @@ def si_columns(source: str, table: Iterable[tuple[str, np.ndarray]]) -> dict[str
     return columns
 
 
-def _split_header(header: str) -> tuple[str, str | None]:
+def split_header(header: str) -> tuple[str, str | None]:
+    """The name and the unit of a header `name[unit]`, the unit None where there are no brackets."""
     match = re.fullmatch(r"([^\[\]]*)\[([^\[\]]*)\]", header.strip())
     return (match[1].strip(), match[2]) if match else (header.strip(), None)
 

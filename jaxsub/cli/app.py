@@ -14,6 +14,7 @@ _PATH = click.Path(path_type=Path)
 METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
+_columns = click.option("--columns", type=_PATH, help="A TOML file that says which channels of a log to take.")
 _overwrite = click.option("--overwrite", is_flag=True, help="Replace what is at --out.")
 
 
@@ -43,12 +44,15 @@ def demo(out: Path, seed: int, overwrite: bool) -> None:
 @_runs
 @_out(required=True)
 @click.option("--method", type=click.Choice(METHODS), default=METHODS[0], show_default=True)
+@_columns
 @_overwrite
-def identify(vehicle: Path, runs: tuple[Path, ...], out: Path, method: str, overwrite: bool) -> None:
+def identify(
+    vehicle: Path, runs: tuple[Path, ...], out: Path, method: str, columns: Path | None, overwrite: bool
+) -> None:
     """Estimate the free coefficients, with standard errors and identifiability."""
     from . import identify as command
 
-    command.run(vehicle, runs, out, method, overwrite)
+    command.run(vehicle, runs, out, method, overwrite, columns)
 
 
 @app.command()
@@ -58,6 +62,7 @@ def identify(vehicle: Path, runs: tuple[Path, ...], out: Path, method: str, over
 @click.option("--hold-out", type=_PATH, multiple=True, help="A run to judge by and not to fit; repeatable.")
 @click.option("--effects", type=_PATH, help="A Python script with effects of your own, to be tried too.")
 @click.option("--manoeuvre/--no-manoeuvre", default=True, help="Where rivals remain, look for the run that settles it.")
+@_columns
 @_overwrite
 def diagnose(
     vehicle: Path,
@@ -66,24 +71,36 @@ def diagnose(
     hold_out: tuple[Path, ...],
     effects: Path | None,
     manoeuvre: bool,
+    columns: Path | None,
     overwrite: bool,
 ) -> None:
     """Fit, locate the mismatch, name the missing physics, model it, and show it on held-out runs."""
     from . import diagnose as command
 
-    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre)
+    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns)
 
 
 @app.command()
 @_vehicle
 @click.argument("run", type=_PATH)
 @_out(required=True)
+@_columns
 @_overwrite
-def simulate(vehicle: Path, run: Path, out: Path, overwrite: bool) -> None:
+def simulate(vehicle: Path, run: Path, out: Path, columns: Path | None, overwrite: bool) -> None:
     """Write the model's answer to a recording's inputs, as a recording."""
     from . import simulate as command
 
-    command.run(vehicle, run, out, overwrite)
+    command.run(vehicle, run, out, overwrite, columns)
+
+
+@app.command()
+@click.argument("log", type=_PATH)
+@click.argument("words", nargs=-1)
+def channels(log: Path, words: tuple[str, ...]) -> None:
+    """List the channels of a vehicle's log, or those whose names hold one of the words."""
+    from . import channels as command
+
+    command.run(log, words)
 
 
 @app.command()

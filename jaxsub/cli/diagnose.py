@@ -29,17 +29,19 @@ def run(
     overwrite: bool,
     script: Path | None = None,
     manoeuvre: bool = True,
+    columns: Path | None = None,
 ) -> None:
     """Diagnose the recordings at `runs`, judged on those at `held` or on what `hold_out` sets aside.
 
-    Effects that the Python file at `script` defines are tried with those that are installed.
+    Effects that the Python file at `script` defines are tried with those that are installed. Of logs the file at
+    `columns` says what to take.
     """
     session.start()
     refuse_existing(out, overwrite)
     own = () if script is None else from_script(script)
     vehicle = read_vehicle(vehicle_path, own)
-    recordings = session.load_runs(runs, vehicle)
-    train, judged = (recordings, session.load_runs(held, vehicle)) if held else hold_out(recordings)
+    recordings = session.load_runs(runs, vehicle, columns)
+    train, judged = (recordings, session.load_runs(held, vehicle, columns)) if held else hold_out(recordings)
     with fresh_folder(out, overwrite) as folder:
         diagnosis = write_diagnosis(vehicle, train, judged, folder, (*vocabulary(), *own), manoeuvre)
     show(diagnosis, out)

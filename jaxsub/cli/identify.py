@@ -20,12 +20,17 @@ from . import session
 from .output import fresh_folder, refuse_existing
 
 
-def run(vehicle_path: Path, runs: Sequence[Path], out: Path, method: str, overwrite: bool) -> None:
-    """Fit the vehicle to the recordings by `method`; write `fitted.toml`, `coefficients.csv`, `identification.json`."""
+def run(
+    vehicle_path: Path, runs: Sequence[Path], out: Path, method: str, overwrite: bool, columns: Path | None = None
+) -> None:
+    """Fit the vehicle to the recordings by `method`; write `fitted.toml`, `coefficients.csv`, `identification.json`.
+
+    Of logs the file at `columns` says what to take.
+    """
     session.start()
     refuse_existing(out, overwrite)
     vehicle = read_vehicle(vehicle_path)
-    recordings = session.load_runs(runs, vehicle)
+    recordings = session.load_runs(runs, vehicle, columns)
     with fresh_folder(out, overwrite) as folder, session.progress(f"identifying {vehicle.layout.name}") as told:
         told(f"fitting by {method}")
         found = fit(vehicle, batch(vehicle, recordings), method=METHODS[method.replace("-", "_")]())

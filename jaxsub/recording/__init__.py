@@ -2,15 +2,20 @@
 
 from jaxsub.recording.files import load, save
 from jaxsub.recording.frames import from_pandas, from_xarray, to_pandas, to_xarray
+from jaxsub.recording.logs import Selection, channels, load_log, read_selection
 from jaxsub.recording.recording import Recording
 from jaxsub.recording.split import hold_out, split
 
 __all__ = [
     "Recording",
+    "Selection",
+    "channels",
     "from_pandas",
     "from_xarray",
     "hold_out",
     "load",
+    "load_log",
+    "read_selection",
     "save",
     "split",
     "to_pandas",

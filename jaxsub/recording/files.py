@@ -3,7 +3,7 @@
 import csv
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,20 +14,35 @@ from pyarrow import parquet
 
 from jaxsub.errors import InputError
 from jaxsub.recording.frames import Table, numeric, recorded, to_pandas, to_xarray, variables
+from jaxsub.recording.logs import SUFFIXES, Selection, load_log
 from jaxsub.recording.recording import FIRST_ROW, Recording
 
 Units = Mapping[str, str]
 
 
-def load(path: str | os.PathLike[str]) -> Recording:
-    """Read a .csv, .parquet or .nc file; the run is named after it.
+def load(
+    path: str | os.PathLike[str],
+    columns: Selection | Mapping[str, str] | None = None,
+    *,
+    held: Collection[str] = (),
+    interpolated: Collection[str] = (),
+) -> Recording:
+    """Read a .csv, .parquet or .nc file, or `columns` of a vehicle's log; the run is named after it.
 
-    Raises InputError, naming the file and where it applies the row and column, whatever the file holds.
+    The rest is for logs alone and handed to `load_log`. Raises InputError, naming the file and where it applies the row
+    and column, whatever the file holds.
     """
     path = Path(path)
+    if path.suffix.lower() in SUFFIXES or (path / "metadata.yaml").is_file():
+        if columns is None:
+            what = "is a log of many channels"
+            raise InputError(str(path), what, f"say which to take by --columns; `jaxsub channels {path}` lists them")
+        return load_log(path, columns, held=held, interpolated=interpolated)
     read, _ = _format(path)
     if not path.is_file():
         raise InputError(str(path), "is a folder" if path.is_dir() else "no such file", "give the path of a recording")
+    if columns is not None:
+        raise InputError(str(path), "is no log: its headers name its columns", "leave --columns out")
     return recorded(read(path), path.stem, str(path))
 
 

@@ -1,0 +1,117 @@
+"""A log of any kind, by its suffix, as a list of channels or as a recording."""
+
+import os
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...errors import InputError
+from ...units import TIME, UnknownUnit, split_header, to_si
+from ..recording import Recording
+from .log import Channel, Log, Series, taken
+from .mcap import McapLog
+from .merge import merged
+from .rosbag import RosBag
+from .selection import Selection, Term
+from .slocum import SlocumLog
+from .ulog import ULog
+
+_SLOCUM = [f".{kind}{form}d" for form in "bc" for kind in "destmn"]
+_KINDS: dict[str, Callable[[Path], Log]] = {".ulg": ULog, ".mcap": McapLog, ".bag": RosBag, ".db3": RosBag}
+_KINDS |= dict.fromkeys(_SLOCUM, SlocumLog)
+SUFFIXES = tuple(_KINDS)
+_AXES = ("yaw", "pitch", "roll")
+
+
+def channels(path: str | os.PathLike[str]) -> list[Channel]:
+    """What a log holds: each channel's name, unit where the log states one, and number of samples.
+
+    The kinds are PX4's .ulg, .mcap, .bag, .db3, a ROS 2 bag's folder, and Slocum's .dbd, .ebd, .sbd, .tbd, .mbd, .nbd.
+    Raises InputError for a file that cannot be read, or whose reader (`pip install 'jaxsub[logs]'`) is not installed.
+    """
+    path = Path(path)
+    with _reading(path):
+        return opened(path).channels()
+
+
+def load_log(
+    path: str | os.PathLike[str],
+    selection: Selection | Mapping[str, str],
+    *,
+    held: Collection[str] = (),
+    interpolated: Collection[str] = (),
+) -> Recording:
+    """The columns of `selection` as one recording, named after the log.
+
+    `held` columns are held between their samples and `interpolated` ones are joined by lines, as a vehicle takes its
+    inputs and its prescribed motions; `merged` says how the rest finds its rows. Raises InputError for a channel that
+    the log does not hold, a unit that is none, and all that a recording is refused for.
+    """
+    path = Path(path)
+    chosen = selection if isinstance(selection, Selection) else Selection(selection)
+    terms = {header: chosen.term(header) for header in chosen.columns}
+    with _reading(path):
+        log = opened(path)
+        found = taken(log, str(path), sorted({t.channel for t in terms.values() if t.function not in _AXES}))
+        turned = {c: _attitude(log, path, c) for c in {t.channel for t in terms.values() if t.function in _AXES}}
+    columns: dict[str, Series] = {}
+    for header, term in terms.items():
+        name, unit = split_header(header)
+        where = f"{chosen.source}, column {header!r}"
+        if name in columns or name == TIME:
+            raise InputError(where, "is there already", "give each column one line; a log brings its own times")
+        source = turned[term.channel][term.function] if term.function in _AXES else found[term.channel]
+        columns[name] = _column(where, source, term, unit)
+    span = {"every": chosen.every, "start": chosen.start, "end": chosen.end}
+    return merged(columns, path.stem, str(path), held=held, interpolated=interpolated, **span)
+
+
+def opened(path: Path) -> Log:
+    """The log at `path`, by its suffix; a folder is a ROS 2 bag."""
+    if not path.exists():
+        raise InputError(str(path), "no such file", "give the path of a log")
+    kind = RosBag if path.is_dir() else _KINDS.get(path.suffix.lower())
+    if kind is None:
+        raise InputError(str(path), f"unknown extension {path.suffix!r}", f"logs are {', '.join(SUFFIXES)}")
+    return kind(path)
+
+
+def _column(where: str, series: Series, term: Term, unit: str | None) -> Series:
+    """In SI, turned and scaled as `term` says."""
+    stated = series.unit if unit is None else unit
+    try:
+        values = to_si(series.values, stated) if stated else series.values
+    except UnknownUnit as error:
+        raise InputError(where, str(error), f"state the channel's unit as name[unit]; {error.remedy}") from error
+    if term.function == "unwrap":
+        kept = ~np.isnan(values)
+        series, values = Series(series.times[kept], values[kept]), np.unwrap(values[kept])
+    return Series(series.times, term.factor * values)
+
+
+def _attitude(log: Log, path: Path, name: str) -> dict[str, Series]:
+    """Yaw, pitch and roll of a quaternion, rad, yaw without jumps of a turn."""
+    forms = ([f"{name}[{index}]" for index in (1, 2, 3, 0)], [f"{name}.{part}" for part in "xyzw"])
+    for form in forms:
+        found = log.series(form)
+        if len(found) == len(form):
+            parts = np.stack([found[part].values for part in form], axis=1)
+            good = np.isfinite(parts).all(axis=1) & (np.abs(parts) > 0.0).any(axis=1)
+            angles = Rotation.from_quat(parts[good]).as_euler("ZYX")
+            angles[:, 0] = np.unwrap(angles[:, 0])
+            return {axis: Series(found[form[0]].times[good], angles[:, i]) for i, axis in enumerate(_AXES)}
+    remedy = f"it needs {forms[0][3]}, {forms[0][0]} and so on, or {forms[1][0]} to {forms[1][3]}"
+    raise InputError(str(path), f"holds no quaternion {name!r}", remedy)
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # no library promises what it raises on a damaged file
+        raise InputError(str(path), f"cannot be read ({error})", "check that it is whole, and a log") from error

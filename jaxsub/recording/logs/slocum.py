@@ -1,0 +1,73 @@
+"""Slocum gliders' binary files (.dbd, .ebd, .sbd, .tbd, .mbd, .nbd and compressed .?cd), read by dbdreader."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import optional
+from .log import Channel, Log, Series
+
+# what a glider calls numbers without a unit; dbdreader turns positions into degrees
+_BARE = {"nodim", "enum", "bool", "bit", "byte", "bytes", "mbytes"}
+_SPELT = {
+    "sec": "s", "secs": "s", "timestamp": "s", "rad/sec": "rad/s", "rad-sec": "rad s", "degc": "degC", "s/m": "S/m",
+    "cc": "cm^3", "in": "inch", "volts": "V", "amps": "A", "watts": "W", "amp-hrs": "A hour", "lat": "deg",
+    "lon": "deg",
+}  # fmt: skip
+_CLOCKS = ("m_present_time", "sci_m_present_time")
+
+
+class SlocumLog(Log):
+    """Channels are the glider's sensors, such as `m_depth`, with the units that the file states.
+
+    Only cycles in which a sensor was updated are samples. A file that does not list its sensors needs the glider's
+    cache files (.cac) in a folder `cac` or `cache` beside it, or in the file's own.
+    """
+
+    def __init__(self, path: Path):
+        self._path = path
+        self._package = optional("dbdreader", "logs", str(path))
+
+    def channels(self) -> list[Channel]:
+        """Every sensor that was updated at least once."""
+        with self._file() as file:
+            names = [name for name in file.parameterNames if name not in _CLOCKS]
+            taken = zip(names, file.get(*names), strict=True)
+            return [Channel(n, _unit(file, n), len(times)) for n, (times, _) in taken if len(times)]
+
+    def series(self, names: list[str]) -> dict[str, Series]:
+        """Times are those of the glider's or the science computer's own clock."""
+        with self._file() as file:
+            known = [name for name in names if name in file.parameterNames]
+            if not known:
+                return {}
+            samples = file.get(*known) if len(known) > 1 else [file.get(*known)]
+            return {n: Series(*_in_order(*pair), _unit(file, n)) for n, pair in zip(known, samples, strict=True)}
+
+    @contextmanager
+    def _file(self) -> Iterator[Any]:
+        beside = [self._path.parent / name for name in ("cac", "cache")]
+        folder = next((folder for folder in beside if folder.is_dir()), None)
+        if folder is None and any(self._path.parent.glob("*.[cC][aA][cC]")):
+            folder = self._path.parent
+        # the package leaves cache files of its own in the folder that it is given
+        with tempfile.TemporaryDirectory(prefix="jaxsub-") as scratch:
+            file = self._package.DBD(str(self._path), cacheDir=str(folder or scratch))
+            try:
+                yield file
+            finally:
+                file.close()
+
+
+def _unit(file: Any, name: str) -> str:
+    unit: str = file.parameterUnits[name]
+    return "" if unit in _BARE else _SPELT.get(unit.lower(), unit)
+
+
+def _in_order(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    kept = np.isfinite(times)
+    return times[kept].astype(np.float64), values[kept].astype(np.float64)

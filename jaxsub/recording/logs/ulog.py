@@ -1,0 +1,55 @@
+"""PX4's ULog (.ulg), read by pyulog."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import optional
+from .log import Channel, Log, Series
+
+_MICRO = 1e-6  # its stamps are in µs
+
+
+class ULog(Log):
+    """Channels are `topic.field`; a second instance of a topic is `topic[1].field`.
+
+    A sample is dated by `timestamp_sample` where its topic has one, which is when the sensor was read, else by
+    `timestamp`. Source: docs.px4.io, ULog File Format.
+    """
+
+    def __init__(self, path: Path):
+        self._path = path
+        self._package = optional("pyulog", "logs", str(path))
+
+    def channels(self) -> list[Channel]:
+        """Every field of every topic but its stamps."""
+        return [
+            Channel(f"{_topic(data)}.{field}", "", len(values))
+            for data in self._read(None).data_list
+            for field, values in data.data.items()
+            if not field.startswith("timestamp")
+        ]
+
+    def series(self, names: list[str]) -> dict[str, Series]:
+        """Only the topics asked for are decoded."""
+        topics = sorted({name.partition(".")[0].partition("[")[0] for name in names})
+        found = {}
+        for data in self._read(topics).data_list:
+            for field in data.data:
+                if (name := f"{_topic(data)}.{field}") in names:
+                    found[name] = Series(_MICRO * _stamps(data.data), data.data[field].astype(np.float64))
+        return found
+
+    def _read(self, topics: list[str] | None) -> Any:
+        with self._path.open("rb") as file:
+            return self._package.ULog(file, topics)
+
+
+def _topic(data: Any) -> str:
+    return data.name if data.multi_id == 0 else f"{data.name}[{data.multi_id}]"
+
+
+def _stamps(fields: dict[str, np.ndarray]) -> np.ndarray:
+    sampled = fields.get("timestamp_sample", fields["timestamp"])
+    return np.where(sampled > 0, sampled, fields["timestamp"]).astype(np.float64)

@@ -1,0 +1,67 @@
+"""A dive that a real glider recorded loads in SI; its sensors agree with one another as physics has them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jaxsub.errors import InputError
+from jaxsub.recording import Selection, channels, load
+
+dbdreader = pytest.importorskip("dbdreader")
+DATA = Path(dbdreader.__file__).parent / "data"
+DIVE = DATA / "ammonite-2008-028-01-000.mbd"  # Mediterranean, January 2008; the file lists its own sensors
+
+
+@pytest.fixture(scope="module")
+def dive():
+    if not DIVE.is_file():
+        pytest.skip("this dbdreader comes without examples")
+    columns = {
+        "z": "m_depth",
+        "pressure": "m_pressure",
+        "theta": "m_pitch",
+        "theta_deg[deg]": "m_pitch",
+        "volume": "1e-6 * m_de_oil_vol",
+        "oil": "m_de_oil_vol",
+        "psi": "unwrap(m_heading)",
+    }
+    return load(DIVE, Selection(columns, every=10.0, start=600.0), held=["oil", "volume"], interpolated=["theta"])
+
+
+def test_depth_is_what_the_pressure_says(dive):
+    both = ~np.isnan(dive.column("z")) & ~np.isnan(dive.column("pressure")) & (dive.column("z") > 20.0)
+    assert both.sum() > 300
+    ratio = dive.column("pressure")[both] / (1028.0 * 9.81 * dive.column("z")[both])
+    np.testing.assert_allclose(np.median(ratio), 1.0, atol=0.02)  # bar came out as Pa
+
+
+def test_stated_units_and_factors_lead_to_si(dive):
+    assert 1e-4 < np.nanmax(np.abs(dive.column("oil"))) < 4e-4  # 270 cm³, in m³
+    np.testing.assert_allclose(dive.column("volume"), 1e-6 * dive.column("oil"))
+    assert np.nanmax(np.abs(dive.column("theta_deg"))) < np.deg2rad(1.0)  # the header's word goes before the log's
+    assert not np.isnan(dive.inputs(["oil", "theta"])).any()
+
+
+def test_heading_has_no_jump_of_a_turn(dive):
+    psi = dive.column("psi")
+    assert np.max(np.abs(np.diff(psi[~np.isnan(psi)]))) < np.pi
+
+
+def test_glider_descends_while_it_points_down(dive):
+    z, theta = dive.column("z"), dive.column("theta")
+    rate = np.diff(z) / np.diff(dive.times)
+    steep = (np.abs(theta[1:]) > 0.3) & ~np.isnan(rate) & (z[1:] > 20.0)
+    assert steep.sum() > 300
+    assert np.mean(np.sign(rate[steep]) == -np.sign(theta[1:][steep])) > 0.97
+
+
+def test_contents_have_units_and_counts(dive):
+    listed = {channel.name: channel for channel in channels(DIVE)}
+    assert listed["m_pitch"] == ("m_pitch", "rad", 1532)
+    assert listed["m_de_oil_vol"].unit == "cm^3" and "m_present_time" not in listed
+
+
+def test_sensor_list_that_is_missing_is_one_error():
+    with pytest.raises(InputError, match="Cache file"):
+        channels(DATA / "amadeus-2014-204-05-000.dbd")
