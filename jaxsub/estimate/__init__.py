@@ -7,6 +7,7 @@ from .filtered import Filtered
 from .fit import Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
 from .method import AbstractMethod, Found, Iterative, share_for
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
+from .posterior import posterior
 from .problem import Expansion, Problem, initial_guess
 from .starts import MARGIN, Basin, Rate, basins, scattered, scattered_by_number, success
 
@@ -43,6 +44,7 @@ __all__ = [
     "newton",
     "newton_eq10",
     "output_errors",
+    "posterior",
     "predict",
     "scattered",
     "scattered_by_number",

@@ -1,0 +1,1 @@
+"""One picture of every effect that a diagnosis may name."""

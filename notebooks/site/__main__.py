@@ -1,0 +1,44 @@
+"""`python -m notebooks.site --out DIR`: write the site; exit 1, and say why, where it would be faulty."""
+
+import argparse
+import shutil
+import sys
+import warnings
+from pathlib import Path
+
+from .check import faults
+from .pages import write_pages
+from .reference import Reference
+
+
+def build(out: Path) -> list[str]:
+    """Write the site into `out`, which is emptied first; what is wrong with it, a line each."""
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        reference = Reference.of("jaxsub")
+        found = [*reference.undocumented(), *reference.write(out / "api"), *write_pages(out, reference)]
+    found += [f"warning: {one.message} ({one.filename}:{one.lineno})" for one in caught if not _told(one)]
+    return found + faults(out)
+
+
+def _told(one: warnings.WarningMessage) -> bool:
+    # the packages that read notebooks deprecate each other's names; nothing of ours is meant
+    return issubclass(one.category, DeprecationWarning) and "jaxsub" not in one.filename
+
+
+def main() -> None:
+    """Arguments in, a site out."""
+    parser = argparse.ArgumentParser(prog="python -m notebooks.site", description=__doc__)
+    parser.add_argument("--out", type=Path, required=True)
+    out = parser.parse_args().out
+    found = build(out)
+    for line in found:
+        print(line, file=sys.stderr)
+    print(f"{out / 'index.html'}: {len(list(out.rglob('*.html')))} pages, {len(found)} faults")
+    sys.exit(1 if found else 0)
+
+
+if __name__ == "__main__":
+    main()
