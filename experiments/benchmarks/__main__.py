@@ -1,132 +1,53 @@
-"""`python -m experiments.benchmarks --out DIR [--quick]`: what a score pass and a whole diagnosis take.
+"""`python -m experiments.benchmarks --out DIR [--quick] [--part NAME]`: speed, against what a user would pick instead.
 
-`score_pass`: a pass over 200 candidates against a Gauss-Newton step on the same fit, its first call (compilation
-included) against the number of candidates. `diagnose`: the command on three runs of 800 samples, 10 channels and 31
-free coefficients, in its own process, with an empty compilation cache and again with a full one.
+Each part runs in a process of its own; `results.json` holds all, with what was aimed at, and `benchmarks.png` shows it.
+
+- `fit`: one fit, beside SciPy, CasADi with IPOPT and jax-sysid. `many_starts`: a sweep, beside CasADi's C.
+- `likelihood`, `batched`: a likelihood, its gradient and Jacobian, beside CasADi's, and the floor.
+- `throughput`: a filter, beside filterpy and dynamax.
+- `score_pass`, `diagnose`: 200 candidates at once, beside refits of each; the command, cold and warm.
+- `growth`: time and memory with samples, batch, coefficients and candidates.
 """
 
-import argparse
-import json
+import importlib
 import os
 import platform
-import resource
-import subprocess
-import sys
-import tempfile
-import time
+from collections.abc import Mapping
 from pathlib import Path
 
 import jax
-import numpy as np
 
-from jaxsub.cli import session
-from jaxsub.discrepancy.columns import candidate_columns
-from jaxsub.discrepancy.evidence import Evidence
-from jaxsub.discrepancy.view import View, facts, look
-from jaxsub.effects import AbstractEffect, candidates
-from jaxsub.estimate import Problem, fit
+from ..parts import main
+from .targets import judged
 
-from .setup import recordings_and_vehicle, write_files
-
-_REPEATS = 7
-
-
-def median_seconds(call) -> float:
-    """The median time of a call after one that is not counted."""
-    call()
-    spent = []
-    for _ in range(_REPEATS):
-        begin = time.perf_counter()
-        call()
-        spent.append(time.perf_counter() - begin)
-    return float(np.median(spent))
+# the part's module, and what in it is the part
+_PARTS = {
+    "fit": ("fit", "run"),
+    "likelihood": ("likelihood", "single"),
+    "batched": ("likelihood", "batched"),
+    "many_starts": ("many_starts", "run"),
+    "throughput": ("throughput", "run"),
+    "score_pass": ("diagnosis", "score_pass"),
+    "diagnose": ("diagnosis", "whole"),
+    "growth": ("growth", "run"),
+    "figure": ("figure", "run"),
+}
 
 
-def score_pass() -> dict:
-    """Time of a Gauss-Newton step and of score passes over 100 and 200 candidates, first calls apart."""
-    from jaxsub.discrepancy import batch
-
-    vehicle, recordings = recordings_and_vehicle()
-    found = fit(vehicle, batch(vehicle, recordings))
-    view = look(found)
-    listed = candidates(facts(view))
-    first = {}
-    for count in (100, 200):
-        chosen: list[AbstractEffect] = (listed * 3)[:count]
-        jax.clear_caches()
-        begin = time.perf_counter()
-        score(view, chosen)
-        first[str(count)] = time.perf_counter() - begin
-    chosen = (listed * 3)[:200]
-    problem = Problem.of(found.vehicle, found.runs, found.sigma, found.start)
-    step = jax.jit(_gauss_newton_step(problem))
-    y = problem.coordinates()
-    step_seconds = median_seconds(lambda: jax.block_until_ready(step(y)))
-    pass_seconds = median_seconds(lambda: score(view, chosen))
-    return {
-        "candidates": len(chosen),
-        "gauss_newton_step_s": step_seconds,
-        "score_pass_s": pass_seconds,
-        "ratio": pass_seconds / step_seconds,
-        "first_pass_s": first,
-    }
+def part(name: str, out: Path, quick: bool) -> dict:
+    """One part's results, and how busy the machine was."""
+    module, call = _PARTS[name]
+    before = os.getloadavg()[0]
+    found = getattr(importlib.import_module(f".{module}", __package__), call)(out, quick)
+    return found | {"load": [before, os.getloadavg()[0]]}
 
 
-def score(view: View, chosen: list[AbstractEffect]) -> None:
-    """One pass: the products of all candidates' columns under one disturbance, and every candidate's gain."""
-    columns, owners = candidate_columns(view, chosen)
-    Evidence.of(view, columns, [view.disturbance]).products[0].gains([], owners)
-
-
-def _gauss_newton_step(problem: Problem):
-    """One step as the search takes it: all columns of the Jacobian and a solve by their Gram matrix."""
-
-    def step(y: jax.Array) -> jax.Array:
-        at = problem.expand(y)
-        return y - jax.numpy.linalg.solve(at.hessian, at.gradient)
-
-    return step
-
-
-def whole_diagnosis() -> dict:
-    """Wall seconds and peak memory of `jaxsub diagnose`, cold and warm."""
-    results = {}
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        write_files(folder)
-        environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
-        for label in ("cold", "warm"):
-            command = [
-                sys.executable, "-c", "from jaxsub.cli import main; main()", "diagnose", str(folder / "vehicle.toml"),
-                *(str(folder / f"run{i}.csv") for i in (1, 2, 3)), "--out", str(folder / label),
-            ]  # fmt: skip
-            begin = time.perf_counter()
-            subprocess.run(command, env=environment, check=True, capture_output=True)
-            verdict = json.loads((folder / label / "diagnosis.json").read_text())
-            results[label] = {
-                "seconds": time.perf_counter() - begin,
-                "verdict": verdict["verdict"],
-                "physics": [found["effect"] for found in verdict["physics"]],
-            }
-        results["peak_memory_GB"] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e6
-    return results
-
-
-def main() -> None:
-    """Measure and write `results.json`."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--quick", action="store_true", help="the score pass only")
-    chosen = parser.parse_args()
-    jax.config.update("jax_enable_x64", True)
-    results: dict = {"python": platform.python_version(), "jax": jax.__version__, "cores": os.cpu_count()}
-    if not chosen.quick:
-        results["diagnose"] = whole_diagnosis()
-    results["score_pass"] = score_pass()
-    chosen.out.mkdir(parents=True, exist_ok=True)
-    (chosen.out / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
-    session.console.print_json(data=results)
+def assembled(found: Mapping[str, dict]) -> dict:
+    """All parts, the machine, and what was aimed at."""
+    machine = {"python": platform.python_version(), "jax": jax.__version__, "cores": os.cpu_count()}
+    measured = {name: results for name, results in found.items() if name != "figure"}
+    return {"machine": machine, "targets": judged(measured), **measured}
 
 
 if __name__ == "__main__":
-    main()
+    main("experiments.benchmarks", __doc__, tuple(_PARTS), part, assembled)

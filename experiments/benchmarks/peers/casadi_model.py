@@ -133,7 +133,7 @@ def cost(model: Model) -> ca.Function:
     z = ca.MX.sym("z", case.size)
     moved = ca.reshape(z[p:], 10, runs)
     of = trajectory(model)
-    total = 0.5 * ca.sumsqr(_prior(case, z[:p])) + 0.5 * ca.sumsqr(moved)
+    total = 0.5 * ca.sumsqr(prior(case, z[:p])) + 0.5 * ca.sumsqr(moved)
     for run in range(runs):
         states = of(z[:p], case.guess[run] + case.spread * moved[:, run], case.fins[run, :-1].T)
         total += 0.5 * ca.sumsqr((case.measured[run].T - states) / case.sigma)
@@ -174,19 +174,29 @@ def sensitivities(model: Model) -> ca.Function:
     return ca.Function("sensitivities", [Y, X0, F], [states, S_all])
 
 
-def in_c(of: ca.Function, folder: Path) -> tuple[ca.Function, dict[str, float]]:
-    """The function compiled by the machine's C compiler, and the seconds that generating and compiling took."""
+def in_c(of: ca.Function, folder: Path, derivatives: bool = False) -> tuple[ca.Function, dict[str, float]]:
+    """The function compiled by the machine's C compiler, and the seconds that generating and compiling took.
+
+    With `derivatives` its Jacobian is compiled too, and CasADi finds it where it differentiates.
+    """
     begin = time.perf_counter()
     source = ca.CodeGenerator(of.name(), {"with_header": False})
     source.add(of)
+    if derivatives:
+        source.add(of.jacobian())
     work = Path(tempfile.mkdtemp(dir=folder))
     source.generate(f"{work}/")
-    generated = time.perf_counter()
-    library = work / f"{of.name()}.so"
-    command = [compiler(), *_FLAGS, str(work / f"{of.name()}.c"), "-o", str(library), "-lm"]
+    generated = time.perf_counter() - begin
+    taken = compiled(work / f"{of.name()}.c")
+    return ca.external(of.name(), str(work / f"{of.name()}.so")), {"generate_s": generated, "compile_s": taken}
+
+
+def compiled(source: Path) -> float:
+    """Make a library beside a C file; the seconds that took."""
+    begin = time.perf_counter()
+    command = [compiler(), *_FLAGS, str(source), "-o", str(source.with_suffix(".so")), "-lm"]
     subprocess.run(command, check=True, capture_output=True)
-    taken = {"generate_s": generated - begin, "compile_s": time.perf_counter() - generated}
-    return ca.external(of.name(), str(library)), taken
+    return time.perf_counter() - begin
 
 
 def compiler() -> str:
@@ -196,7 +206,7 @@ def compiler() -> str:
     return found
 
 
-def _prior(case: Case, y: ca.MX) -> ca.MX:
+def prior(case: Case, y: ca.MX) -> ca.MX:
     pull = (case.centre + np.abs(case.centre) * y - case.prior_mean) / case.prior_std
     return pull[np.flatnonzero(np.isfinite(case.prior_std)).tolist()]
 

@@ -1,0 +1,110 @@
+"""What a score pass and a whole diagnosis take, and what the same costs by refitting every candidate."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.columns import candidate_columns
+from jaxsub.discrepancy.evidence import Evidence
+from jaxsub.discrepancy.view import View, facts, look
+from jaxsub.effects import AbstractEffect, candidates
+from jaxsub.estimate import Problem, fit
+
+from .setup import recordings_and_vehicle, write_files
+from .timing import once, timed
+
+
+def score_pass(out: Path, quick: bool) -> dict:
+    """A Gauss-Newton step and score passes over 100 and 200 candidates, first calls apart; refits of a few of them."""
+    vehicle, recordings = recordings_and_vehicle()
+    found = fit(vehicle, batch(vehicle, recordings))
+    view = look(found)
+    listed = candidates(facts(view))
+    first = {}
+    for count in (200,) if quick else (100, 200):
+        jax.clear_caches()
+        first[str(count)] = once(lambda count=count: score(view, (listed * 3)[:count]))[1]
+    chosen = (listed * 3)[:200]
+    problem = Problem.of(found.vehicle, found.runs, found.sigma, found.start)
+    step = jax.jit(_gauss_newton_step(problem))
+    y = problem.coordinates()
+    repeats = 3 if quick else 7
+    step_seconds = timed(lambda: step(y), repeats)
+    pass_seconds = timed(lambda: score(view, chosen), repeats)
+    refits = refitted(found, listed, 1 if quick else 6)
+    whole = len(chosen) * refits["first_s"]["s"]
+    return {
+        "candidates": len(chosen),
+        "gauss_newton_step": step_seconds,
+        "score_pass": pass_seconds,
+        "ratio": pass_seconds["s"] / step_seconds["s"],
+        "first_pass_s": first,
+        "refit_one": refits,
+        "refit_all_s": whole,
+        "times_faster_than_refits": whole / pass_seconds["s"],
+        "times_faster_than_compiled_refits": len(chosen) * refits["again_s"]["s"] / pass_seconds["s"],
+    }
+
+
+def score(view: View, chosen: list[AbstractEffect]) -> None:
+    """One pass: the products of all candidates' columns under one disturbance, and every candidate's gain."""
+    columns, owners = candidate_columns(view, chosen)
+    Evidence.of(view, columns, [view.disturbance]).products[0].gains([], owners)
+
+
+def refitted(found, listed: list[AbstractEffect], count: int) -> dict:
+    """Fits with one candidate in the model, as one asks without a score: each is a program of its own to compile."""
+    forces = [effect for effect in listed if effect.where and ":" not in effect.where[0]]
+    chosen = [forces[i] for i in np.linspace(0, len(forces) - 1, count).astype(int)]
+    first, again = [], []
+    for effect in chosen:
+        vehicle = found.vehicle.with_effect(effect)
+        first.append(once(lambda vehicle=vehicle: fit(vehicle, found.runs).cost)[1])
+        again.append(once(lambda vehicle=vehicle: fit(vehicle, found.runs).cost)[1])
+    spread = lambda rows: {"s": float(np.median(rows)), "least_s": min(rows), "most_s": max(rows)}
+    return {"candidates": [e.label for e in chosen], "first_s": spread(first), "again_s": spread(again)}
+
+
+def _gauss_newton_step(problem: Problem):
+    """One step as the search takes it: all columns of the Jacobian and a solve by their Gram matrix."""
+
+    def step(y: jax.Array) -> jax.Array:
+        at = problem.expand(y)
+        return y - jax.numpy.linalg.solve(at.hessian, at.gradient)
+
+    return step
+
+
+def whole(out: Path, quick: bool) -> dict:
+    """Wall seconds and peak memory of `jaxsub diagnose` in its own process: an empty compilation cache, a full one."""
+    results = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        write_files(folder)
+        environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
+        for label in ("cold", "warm"):
+            command = [
+                sys.executable, "-c", "from jaxsub.cli import main; main()", "diagnose", str(folder / "vehicle.toml"),
+                *(str(folder / f"run{i}.csv") for i in (1, 2, 3)), "--out", str(folder / label),
+            ]  # fmt: skip
+            begin = time.perf_counter()
+            subprocess.run(command, env=environment, check=True, capture_output=True)
+            verdict = json.loads((folder / label / "diagnosis.json").read_text())
+            results[label] = {
+                "seconds": time.perf_counter() - begin,
+                "verdict": verdict["verdict"],
+                "physics": [found["effect"] for found in verdict["physics"]],
+            }
+        results["peak_memory_GB"] = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e6
+    # what is left once nothing is compiled is what the machine computes; the rest is compiling
+    results["compile_s"] = results["cold"]["seconds"] - results["warm"]["seconds"]
+    return results

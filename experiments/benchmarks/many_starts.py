@@ -1,0 +1,94 @@
+"""A sweep over initial guesses on two cores: this library's pool against CasADi's C, a share in each of two processes.
+
+Both take the same damped Gauss-Newton steps from the same starts to the same tolerance.
+"""
+
+import multiprocessing
+import tempfile
+import time
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxsub.cli import session
+from jaxsub.estimate import gauss_newton, scattered
+
+from .case import Case, problem_and_case
+from .peers.casadi_fit import SingleShooting
+from .peers.casadi_model import Model
+from .peers.damped import End
+from .timing import once, pin
+
+COUNT, SPREAD, SEED = 1000, 0.5, 5
+# s that one side may take; where it would take longer it does as many starts as fit, and the table says how many
+_LIMIT, _TRIAL = 240.0, 32
+_MARGIN = 0.1
+_peer: list[SingleShooting] = []
+
+
+def run(out: Path, quick: bool) -> dict:
+    """Seconds a start, and how many starts end at the least cost known, of both."""
+    pin(2)
+    problem, case = problem_and_case()
+    starts = np.asarray(scattered(problem, SPREAD, COUNT, SEED))
+    sweep = lambda count: gauss_newton().run(problem, jnp.asarray(starts[:count]))
+    # over both cores even a small sweep, as the large one is: a program is compiled for a number of starts
+    session.console.print("many_starts: jaxsub …", highlight=False)
+    compiling = once(lambda: sweep(_TRIAL))[1]
+    trial = once(lambda: sweep(_TRIAL))[1]
+    count = _TRIAL if quick else int(min(COUNT, _LIMIT / (trial / _TRIAL)))
+    count -= count % 2
+    found, seconds = once(lambda: sweep(count))
+    if count != _TRIAL:
+        # the first call of this size compiled as well
+        seconds = min(seconds, once(lambda: sweep(count))[1]) if seconds < 0.5 * _LIMIT else seconds
+    ours = {"starts": count, "compile_s": compiling - trial, "seconds": seconds, "cost": np.asarray(found.cost)}
+    session.console.print("many_starts: CasADi …", highlight=False)
+    theirs = _two_processes(case, starts[: _TRIAL if quick else COUNT])
+    best = min(np.nanmin(ours["cost"]), np.nanmin(theirs["cost"]))
+    for row in (ours, theirs):
+        cost = row.pop("cost")
+        row["seconds_a_start"] = row["seconds"] / row["starts"]
+        row["reached"] = float(np.mean(cost < best + _MARGIN))
+        row["lost"] = int(np.sum(~np.isfinite(cost)))
+    return {
+        "cores": 2,
+        "spread": SPREAD,
+        "jaxsub": ours,
+        "CasADi C, two processes": theirs,
+        "times_faster": theirs["seconds_a_start"] / ours["seconds_a_start"],
+        "evaluations_median": float(np.median(np.asarray(jax.device_get(found.evaluations)))),
+    }
+
+
+def _two_processes(case: Case, starts: np.ndarray) -> dict:
+    context = multiprocessing.get_context("spawn")
+    shares = np.array_split(starts, 2)
+    with tempfile.TemporaryDirectory() as folder, context.Pool(2, _begin, (case, folder)) as pool:
+        compile_s = max(pool.map(_warm, [share[:1] for share in shares], chunksize=1))
+        begin = time.perf_counter()
+        parts = pool.map(_share, shares, chunksize=1)
+        seconds = time.perf_counter() - begin
+    ends: list[End] = [end for part in parts for end in part]
+    return {
+        "starts": len(ends),
+        "compile_s": compile_s,
+        "seconds": seconds,
+        "cost": np.array([end.cost for end in ends]),
+        "evaluations_median": float(np.median([end.evaluations for end in ends])),
+    }
+
+
+def _begin(case: Case, folder: str) -> None:
+    _peer.append(SingleShooting(Model(case), Path(folder)))
+
+
+def _warm(starts: np.ndarray) -> float:
+    _share(starts)
+    return sum(_peer[0].compile.values())
+
+
+def _share(starts: np.ndarray) -> list[End]:
+    return [_peer[0].fit(start) for start in starts]

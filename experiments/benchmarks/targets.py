@@ -1,0 +1,34 @@
+"""What was aimed at, beside what was measured."""
+
+from collections.abc import Mapping
+
+
+def judged(found: Mapping[str, dict]) -> dict[str, dict]:
+    """Each aim with its measured value and whether it is met, of the parts that were run."""
+    rows: dict[str, dict] = {}
+
+    def row(what: str, value: float, aim: float, more: bool) -> None:
+        rows[what] = {"measured": value, "aim": aim, "met": bool(value >= aim if more else value <= aim)}
+
+    if "fit" in found:
+        times = found["fit"]["times_ours"]
+        for words, aim in (("SciPy as users write it", 30.0), ("SciPy, stacked by an expert", 30.0), ("CasADi", 3.0)):
+            chosen = [value for name, value in times.items() if name.startswith(words)]
+            row(f"a fit: times faster than {words}, its best", min(chosen), aim, more=True)
+    if "many_starts" in found:
+        row("a sweep: times faster than CasADi's C", found["many_starts"]["times_faster"], 3.0, more=True)
+    if "batched" in found:
+        row("a batched likelihood, over CasADi's C", found["batched"]["likelihood_over_CasADi_C"], 1.0, more=False)
+    if "likelihood" in found:
+        ratio = found["likelihood"]["ratios"]["forward_jacobian_in_simulations"]
+        row("forward Jacobian of 25 coefficients, in simulations", ratio, 4.0, more=False)
+    if "diagnose" in found:
+        row("diagnose, cold, s", found["diagnose"]["cold"]["seconds"], 20.0, more=False)
+        row("diagnose, cached, s", found["diagnose"]["warm"]["seconds"], 3.0, more=False)
+    for what in ("samples", "batch", "candidates"):
+        if "growth" in found:
+            row(f"growth with {what}: slope of time", found["growth"][what]["slope_of_time"], 1.05, more=False)
+    if "growth" in found:
+        peaks = list(found["growth"]["batch"]["peak_GB"].values())
+        row("growth with batch: peak memory, most over least", peaks[-1] / peaks[0], 1.1, more=False)
+    return rows

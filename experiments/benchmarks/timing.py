@@ -1,0 +1,50 @@
+"""How a call is timed: its first time apart, then repeats with their spread; on one core where peers are paired."""
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+
+def pin(cores: int) -> list[int]:
+    """Keep this process, and the threads that it starts from now on, on so many of its cores; which."""
+    chosen = sorted(os.sched_getaffinity(0))[:cores]
+    os.sched_setaffinity(0, chosen)
+    return chosen
+
+
+def timed(call: Callable[[], Any], repeats: int) -> dict[str, float]:
+    """Seconds of the first call, and of `repeats` more: median, least and most."""
+    first, spent = once(call)[1], [once(call)[1] for _ in range(repeats)]
+    return {"first_s": first, "s": float(np.median(spent)), "least_s": min(spent), "most_s": max(spent)}
+
+
+def in_turn(calls: dict[str, Callable[[], Any]], repeats: int) -> dict[str, dict[str, float]]:
+    """The same of several, one after the other in every round: what else the machine does meets all of them."""
+    first = {name: once(call)[1] for name, call in calls.items()}
+    spent = [{name: once(call)[1] for name, call in calls.items()} for _ in range(repeats)]
+    of = lambda name: [row[name] for row in spent]
+    return {
+        name: {"first_s": first[name], "s": float(np.median(of(name))), "least_s": min(of(name)), "most_s": max(of(name))}
+        for name in calls
+    }  # fmt: skip
+
+
+def once(call: Callable[[], Any]) -> tuple[Any, float]:
+    """What a call gives, and its seconds."""
+    begin = time.perf_counter()
+    found = jax.block_until_ready(call())
+    return found, time.perf_counter() - begin
+
+
+def slope(sizes: list[int], values: list[float]) -> float:
+    """Of log `values` over log `sizes`, by least squares."""
+    return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
+
+
+def spread_of(rows: list[float]) -> dict[str, float]:
+    """Median, least and most of several runs' seconds."""
+    return {"s": float(np.median(rows)), "least_s": min(rows), "most_s": max(rows)}
