@@ -20,7 +20,7 @@ from jaxsub.effects import AbstractEffect, candidates
 from jaxsub.estimate import Problem, fit
 
 from .setup import recordings_and_vehicle, write_files
-from .timing import once, timed
+from .timing import once, spread_of, timed
 
 
 def score_pass(out: Path, quick: bool) -> dict:
@@ -70,8 +70,7 @@ def refitted(found, listed: list[AbstractEffect], count: int) -> dict:
         vehicle = found.vehicle.with_effect(effect)
         first.append(once(lambda vehicle=vehicle: fit(vehicle, found.runs).cost)[1])
         again.append(once(lambda vehicle=vehicle: fit(vehicle, found.runs).cost)[1])
-    spread = lambda rows: {"s": float(np.median(rows)), "least_s": min(rows), "most_s": max(rows)}
-    return {"candidates": [e.label for e in chosen], "first_s": spread(first), "again_s": spread(again)}
+    return {"candidates": [e.label for e in chosen], "first_s": spread_of(first), "again_s": spread_of(again)}
 
 
 def _gauss_newton_step(problem: Problem):

@@ -6,14 +6,12 @@ has where it ended: a peer that ends above the best has not done the same work, 
 
 import tempfile
 from collections.abc import Callable
+from importlib.metadata import version
 from pathlib import Path
 
-import casadi as ca
 import jax
 import jax.numpy as jnp
-import jax_sysid
 import numpy as np
-import scipy
 
 from jaxsub.cli import session
 from jaxsub.estimate import Problem, gauss_newton
@@ -73,7 +71,7 @@ def run(out: Path, quick: bool) -> dict:
     taken = {name: row.get("s") or row.get("more_than_s") or row["at_least_s"] for name, row in found.items()}
     return {
         "cores": cores,
-        "versions": {"casadi": ca.__version__, "scipy": scipy.__version__, "jax-sysid": _version("jax-sysid")},
+        "versions": {name: version(name) for name in ("casadi", "scipy", "jax-sysid")},
         "free": len(case.names),
         "samples": list(case.measured.shape[:2]),
         "fits": found,
@@ -102,10 +100,3 @@ def _error(case: Case, z: np.ndarray) -> float:
     p = len(case.names)
     theta = case.centre + np.abs(case.centre) * z[:p]
     return float(np.median(np.abs(theta / case.truth - 1.0)))
-
-
-def _version(name: str) -> str:
-    from importlib.metadata import version
-
-    assert jax_sysid
-    return version(name)

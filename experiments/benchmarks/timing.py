@@ -18,19 +18,14 @@ def pin(cores: int) -> list[int]:
 
 def timed(call: Callable[[], Any], repeats: int) -> dict[str, float]:
     """Seconds of the first call, and of `repeats` more: median, least and most."""
-    first, spent = once(call)[1], [once(call)[1] for _ in range(repeats)]
-    return {"first_s": first, "s": float(np.median(spent)), "least_s": min(spent), "most_s": max(spent)}
+    return in_turn({"it": call}, repeats)["it"]
 
 
 def in_turn(calls: dict[str, Callable[[], Any]], repeats: int) -> dict[str, dict[str, float]]:
     """The same of several, one after the other in every round: what else the machine does meets all of them."""
     first = {name: once(call)[1] for name, call in calls.items()}
     spent = [{name: once(call)[1] for name, call in calls.items()} for _ in range(repeats)]
-    of = lambda name: [row[name] for row in spent]
-    return {
-        name: {"first_s": first[name], "s": float(np.median(of(name))), "least_s": min(of(name)), "most_s": max(of(name))}
-        for name in calls
-    }  # fmt: skip
+    return {name: {"first_s": first[name], **spread_of([row[name] for row in spent])} for name in calls}
 
 
 def once(call: Callable[[], Any]) -> tuple[Any, float]:

@@ -14,9 +14,11 @@ from .damped import End, minimise
 class SingleShooting:
     """Cost, gradient and curvature of a case from the C that CasADi generates for a run and its sensitivities."""
 
-    def __init__(self, model: Model, folder: Path):
+    def __init__(self, model: Model, folder: Path | None):
         self.case = model.case
-        self.function, self.compile = in_c(sensitivities(model), folder)
+        function = sensitivities(model)
+        # without a folder to compile in it is CasADi's own machine that evaluates
+        self.function, self.compile = in_c(function, folder) if folder else (function, {})
 
     def expand(self, z: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         """The cost (priors included), its gradient (d,) and J^T J (d, d) at the coordinates `z`."""
@@ -45,7 +47,7 @@ class SingleShooting:
             gradient[own] += weight * first
             curvature[own, own] += weight**2
             cost += 0.5 * (flat @ flat + first @ first)
-        return cost, gradient, curvature
+        return float(cost), gradient, curvature
 
     def fit(self, z: np.ndarray) -> End:
         """The end of the search from `z`."""
@@ -98,10 +100,7 @@ class MultipleShooting:
         weight, multipliers = ca.MX.sym("s"), ca.MX.sym("l", nlp["g"].size1())
         H = ca.Function("curvature", [V, ca.MX(0, 1), weight, multipliers], [weight * ca.triu(J.T @ J)])
         # states start at what was measured, as is usual
-        starts = [
-            (case.measured[run, : pieces * stride + 1 : stride].T / scale[:, None]).ravel("F") for run in range(runs)
-        ]
-        self.start = np.concatenate(starts)
+        self.start = (case.measured[:, : pieces * stride + 1 : stride] / scale).ravel()
         self.case, self.scale, self.pieces = case, scale, pieces
         options = {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-6, "hess_lag": H}
         options |= {"ipopt.max_iter": 100, "ipopt.mu_init": 1e-6}

@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -206,7 +207,8 @@ def compiler() -> str:
     return found
 
 
-def prior(case: Case, y: ca.MX) -> ca.MX:
+def prior(case: Case, y: Any) -> Any:
+    """What the priors add to the residuals."""
     pull = (case.centre + np.abs(case.centre) * y - case.prior_mean) / case.prior_std
     return pull[np.flatnonzero(np.isfinite(case.prior_std)).tolist()]
 
@@ -221,7 +223,7 @@ def _matrix(rows: equations.Matrix) -> ca.SX:
     return ca.sparsify(matrix)
 
 
-def _nonzeros(matrix: ca.SX) -> ca.SX:
+def _nonzeros(matrix: Any) -> ca.SX:
     return ca.vertcat(*matrix.nonzeros())
 
 

@@ -12,6 +12,8 @@ _VELOCITIES = "uvwpqr"
 _RIGID = ("mass", "mass", "mass", "I_x", "I_y", "I_z")
 
 Matrix = list[list[Any]]
+# a sequence, or an array whose first axis is one
+Entries = Any
 Trigonometry = tuple[Callable, Callable]
 
 
@@ -33,7 +35,7 @@ def damping_matrix(values: Mapping[str, Any]) -> Matrix:
     return matrix
 
 
-def force(values: Mapping[str, Any], state: Sequence[Any], fins: Sequence[Any], trig: Trigonometry) -> list[Any]:
+def force(values: Mapping[str, Any], state: Entries, fins: Entries, trig: Trigonometry) -> list[Any]:
     """Fins (rudder, right and left elevator), thrust and restoring; the body floats: weight is buoyancy."""
     sin, cos = trig
     phi, theta = state[6], state[7]
@@ -50,7 +52,7 @@ def force(values: Mapping[str, Any], state: Sequence[Any], fins: Sequence[Any], 
     ]
 
 
-def position_rates(state: Sequence[Any], trig: Trigonometry) -> list[Any]:
+def position_rates(state: Entries, trig: Trigonometry) -> list[Any]:
     """Rates of φ, θ, ψ and z."""
     sin, cos = trig
     u, v, w, p, q, r, phi, theta = state[:8]

@@ -4,6 +4,7 @@ Fins are held, so the solver is started again wherever one moves: an adaptive st
 wrong. Tolerances give the outputs to about a ten-thousandth of their noise, as this library's own step does.
 """
 
+import itertools
 import time
 
 import numpy as np
@@ -104,7 +105,7 @@ class Stacked:
     def fit(self, z: np.ndarray) -> End:
         """The end of the search from `z`."""
         self.evaluations = 0
-        found = least_squares(self.residuals, z, self.jacobian, ftol=1e-8, xtol=1e-10, x_scale="jac")
+        found = least_squares(self.residuals, z, self.jacobian, ftol=1e-8, xtol=1e-10, x_scale="jac")  # pyright: ignore
         return End(found.x, float(found.cost), self.evaluations)
 
     def _whitened(self, z: np.ndarray, shown: np.ndarray) -> np.ndarray:
@@ -118,7 +119,7 @@ def _driven(rates, start: np.ndarray, fins: np.ndarray, interval: float, pick) -
     edges = [0, *moves.tolist(), K - 1]
     found = np.empty((K, len(start)))
     found[0] = start
-    for begin, end in zip(edges[:-1], edges[1:], strict=True):
+    for begin, end in itertools.pairwise(edges):
         at = interval * np.arange(end - begin + 1)
         fixed = pick(fins[:, begin])
         solution = solve_ivp(rates, (0.0, at[-1]), found[begin], t_eval=at[1:], args=(fixed,), **TOLERANCE)

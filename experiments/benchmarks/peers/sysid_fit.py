@@ -6,6 +6,7 @@ Kutta's as a user writes them; fixed numbers of the model are closed over.
 
 import contextlib
 import io
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -48,7 +49,7 @@ def fit(case: Case, z: np.ndarray, epochs: int) -> End:
         return 0.5 * jnp.sum((((theta - case.prior_mean) / case.prior_std)[known]) ** 2)
 
     weight = case.spread / case.sigma
-    model = Model(10, 10, 3, state_fcn=step, output_fcn=lambda x, u, params: x)
+    model: Any = Model(10, 10, 3, state_fcn=step, output_fcn=lambda x, u, params: x)
     model.init(params=[np.array(z[:p])], x0=[row / case.spread for row in case.guess])
     wide = lambda shown, measured: 0.5 * jnp.sum(((shown - measured) * weight) ** 2)
     model.loss(output_loss=wide, rho_x0=0.0, rho_th=0.0, custom_regularization=prior, xsat=1e6)
