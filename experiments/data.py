@@ -5,9 +5,14 @@ import sys
 from pathlib import Path
 
 
+def folders() -> list[Path]:
+    """Where data sets are looked for, in order."""
+    return [Path(p) for p in (os.environ.get("JAXSUB_DATA"), "../shared/data") if p]
+
+
 def data_folder(name: str) -> Path:
     """The folder of a data set, in `$JAXSUB_DATA` or `../shared/data`; ends the program where there is none."""
-    places = [Path(p) for p in (os.environ.get("JAXSUB_DATA"), "../shared/data") if p]
+    places = folders()
     for place in places:
         if (place / name).is_dir():
             return place / name

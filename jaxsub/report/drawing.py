@@ -36,6 +36,7 @@ _STYLE: dict[Any, Any] = {
     "text.usetex": False,
     "text.parse_math": False,  # a `$` in a name is a `$`
     "axes.edgecolor": GREY,
+    "axes.grid": False,  # whatever the caller has
     "axes.labelcolor": INK,
     "axes.labelsize": 9.0,
     "axes.linewidth": 0.7,
@@ -69,12 +70,18 @@ WIDE, NARROW = PageWidth(9.8, 2), PageWidth(4.7, 1)
 
 @dataclasses.dataclass(frozen=True)
 class Picture:
-    """One figure: its file name without suffix, what it shows in words, and the PNG; `narrow` is set for a phone."""
+    """One figure: its file name without suffix, what it shows in words, and the PNG; `narrow` is set for a phone.
+
+    A notebook shows it as the last value of a cell.
+    """
 
     name: str
     alt: str
-    png: bytes
-    narrow: bytes | None = None
+    png: bytes = dataclasses.field(repr=False)
+    narrow: bytes | None = dataclasses.field(default=None, repr=False)
+
+    def _repr_png_(self) -> bytes:
+        return self.png
 
 
 def style() -> contextlib.AbstractContextManager[None]:
