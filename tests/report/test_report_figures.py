@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from IPython.core.formatters import DisplayFormatter
 from PIL import Image
 from report_examples import diagnosis
 from report_traces import CHANNELS
@@ -91,6 +92,19 @@ def test_settings_of_the_caller_stay():
     with style():
         assert matplotlib.rcParams["text.parse_math"] is False
     assert dict(matplotlib.rcParams) == before
+
+
+def test_a_grid_that_the_caller_likes_is_not_drawn_into_ours():
+    plain = draw(diagnosis("named"))["scan"].png
+    with matplotlib.rc_context({"axes.grid": True}):
+        assert draw(diagnosis("named"))["scan"].png == plain
+
+
+def test_a_notebook_shows_a_figure_and_prints_no_bytes_of_it():
+    formatted, _ = DisplayFormatter().format(draw(diagnosis("named"))["scan"])
+    with Image.open(io.BytesIO(formatted["image/png"])) as image:
+        assert image.format == "PNG"
+    assert len(formatted["text/plain"]) < 200
 
 
 def test_awkward_names_and_empty_data_draw_without_a_warning():
