@@ -15,7 +15,7 @@ from nbclient import NotebookClient
 from .data import folders
 
 HERE = Path(__file__).resolve().parent.parent / "notebooks"
-_LONGEST = 600  # s, a cell
+_LONGEST = 3600  # s, a cell
 
 
 def execute(path: Path, environment: dict[str, str] | None = None) -> nbformat.NotebookNode:
