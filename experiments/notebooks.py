@@ -33,8 +33,9 @@ def execute(path: Path, environment: dict[str, str] | None = None) -> nbformat.N
             record_timing=False,
             resources={"metadata": {"path": folder}},
         )
+        own = {"PYTHONPATH": os.pathsep.join(filter(None, [str(HERE.parent), os.environ.get("PYTHONPATH")]))}
         known = {"JAXSUB_DATA": data[0]} if data else {}
-        client.execute(env={**os.environ, **known, **(environment or {})})
+        client.execute(env={**os.environ, **own, **known, **(environment or {})})
     notebook.metadata.pop("widgets", None)
     notebook.metadata["language_info"] = {"name": "python"}
     return notebook
