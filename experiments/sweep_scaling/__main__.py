@@ -59,8 +59,8 @@ def timed(stores: Path, quick: bool, address: str | None) -> dict:
     clock: Callable[[], float] = time.perf_counter
     with tempfile.TemporaryDirectory() as scratch:
         begin = clock()
-        # as many chunks as compile whatever the larger sweeps need, on every worker
-        sweep(plan(quick, 4 * sizes(quick)[0]), Path(scratch) / "first", cluster=address)
+        # two chunks, so that both devices or workers compile
+        sweep(plan(quick, 2 * sizes(quick)[0]), Path(scratch) / "first", cluster=address)
         first = clock() - begin
     seconds = []
     for size in sizes(quick):
@@ -107,7 +107,7 @@ def _difference(one: np.ndarray, other: np.ndarray) -> float | None:
 
 def memory(out: Path, quick: bool) -> dict:
     """Bytes that XLA sets aside for a pool of 1, 2, 4, 8 lanes, and of 8 lanes for longer runs, beside the bound."""
-    made, lengths = plan(quick, 64), [150, 300, 600] if quick else [300, 600, 1200, 2400]
+    made, lengths = plan(quick, 64), [80, 160, 320] if quick else [300, 600, 1200, 2400]
     lanes = [1, 2, 4, 8]
     by_lanes = [_bytes(made.problems[0], count) for count in lanes]
     problems = [longer(made, length).problems[0] for length in lengths]

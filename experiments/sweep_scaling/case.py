@@ -16,9 +16,11 @@ _WRONG, _SPREAD, _SEED = 0.2, 0.5, 3
 
 
 def plan(quick: bool, starts: int) -> Plan:
-    """NPS AUV II in six degrees of freedom on two runs of 300 samples; `quick`, DSRV in its plane."""
+    """NPS AUV II in six degrees of freedom on two runs of 300 samples; `quick`, DSRV in its plane on two of 80."""
     truth = dsrv() if quick else nps_auv_ii()
-    recordings = synthetic(truth, [_driven(truth, 300, i) for i in range(2)], seed=_SEED, states=sampled_states)
+    recordings = synthetic(
+        truth, [_driven(truth, 80 if quick else 300, i) for i in range(2)], seed=_SEED, states=sampled_states
+    )
     return Plan({truth.layout.name: _off(truth)}, {"two runs": recordings}, starts, spread=_SPREAD, seed=_SEED)
 
 
