@@ -82,6 +82,8 @@ def pictures(out: Path, quick: bool) -> Iterator[dict]:
         effect = effect_of(scene, on)
         channel = on.vehicle.layout.channels.index(scene.channel)
         changed = on.shown(on.vehicle.with_effect(effect))[:, channel]
+        if not np.all(np.isfinite(changed)) or np.allclose(changed, on.plain[:, channel]):
+            raise RuntimeError(f"{effect.label} diverges, or does not show in {scene.channel}")
         draw(out / f"{scene.name}.png", scene.channel, on.drive, on.vehicle, on.plain[:, channel], changed)
         session.console.print(f"{effect.label} in {scene.channel}", highlight=False, markup=False)
         yield {

@@ -6,10 +6,15 @@ import numpy as np
 
 from jaxsub.effects import CHANNEL_UNITS
 from jaxsub.recording import Recording
-from jaxsub.report.drawing import BASELINE, GREY, IMPROVED, new_figure, png, style
+from jaxsub.report.drawing import BASELINE, GREY, IMPROVED, INK, LOCATED, new_figure, png, style
 from jaxsub.vehicle import AbstractVehicle
 
-_SHADES = (GREY, "#a9b1ba", "#c9ced4", "#dfe3e6")
+_LINES = (
+    {"color": INK},
+    {"color": GREY, "linestyle": (0, (4, 1.5))},
+    {"color": GREY, "linestyle": (0, (1, 1))},
+    {"color": LOCATED, "linestyle": "-"},
+)
 _DEGREES = {"rad": "°", "rad/s": "°/s"}
 
 
@@ -23,12 +28,10 @@ def draw(
     with style():
         figure = new_figure(5.6, 2.7)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.4))
-        for (actuator, column), shade in zip(
-            vehicle.layout.inputs, (GREY, "#a9b1ba", "#c9ced4", "#dfe3e6"), strict=False
-        ):
+        for (actuator, column), line in zip(vehicle.layout.inputs, _LINES, strict=False):
             command = drive.column(column)
             largest = float(np.abs(command).max())
-            above.plot(t, command / largest, color=shade, label=actuator.replace("_", " "), drawstyle="steps-post")
+            above.plot(t, command / largest, **line, lw=0.9, label=actuator.replace("_", " "), drawstyle="steps-post")
         above.set_yticks([-1.0, 0.0, 1.0], ["", "0", ""])
         above.set_ylabel("inputs")
         above.legend(loc="upper left", bbox_to_anchor=(0.0, 1.45), ncol=4, fontsize=7, handlelength=1.2, borderpad=0.0)
@@ -38,6 +41,6 @@ def draw(
         below.set_xlabel("t [s]")
         if channel == "z":
             below.invert_yaxis()
-        below.legend(loc="best", ncol=2)
+        below.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncol=2, borderpad=0.0)
         figure.align_ylabels()
         path.write_bytes(png(figure))

@@ -60,13 +60,13 @@ SCENES = (
     Scene("thruster-cross-coupling", "p", "roll,rudder"),
     Scene("current", "u", "", {"V_N": 0.25, "V_E": 0.15}),
     Scene("wave-forcing", "w", "heave", {"omega": 0.9, "a": 120.0, "b": 0.0}),
-    Scene("free-surface-suction", "z", "heave", {"h": 2.0}, body="nps-shallow"),
-    Scene("bottom-suction", "z", "heave", {"h": 2.0}, body="nps-altitude"),
+    Scene("free-surface-suction", "w", "heave", {"h": 2.0}, body="nps-shallow"),
+    Scene("bottom-suction", "w", "heave", {"h": 2.0}, body="nps-altitude"),
     Scene("tether-drag", "u"),
-    Scene("coulomb-friction", "x", "x", {"F_c": 0.25, "F_0": 0.0}, body="rig"),
+    Scene("coulomb-friction", "x", "x", {"F_c": 0.12, "F_0": 0.0}, body="rig"),
     Scene("cubic-stiffness", "x", "x", body="rig"),
-    Scene("hysteresis", "x", "x", {"F_h": 0.5, "x_y": 0.05}, body="rig"),
-    Scene("saturation", "x", "x", {"x_s": 0.2}, body="rig"),
+    Scene("hysteresis", "x", "x", {"F_h": 0.4, "x_y": 0.5}, body="rig"),
+    Scene("saturation", "x", "x", {"x_s": 0.3}, body="rig"),
     Scene("sensor-bias", "r", "r"),
     Scene("sensor-scale", "r", "r", {"scale": 0.2}),
     Scene("sensor-delay", "r", "r", {"tau": 1.0}),
@@ -85,7 +85,7 @@ def stage(name: str) -> tuple[AbstractVehicle, Recording, np.ndarray]:
     layout = vehicle.layout
     t = INTERVAL * np.arange(SAMPLES)
     if name == "rig":
-        drive = 0.8 * np.sin(2.0 * np.pi * (0.05 + 0.004 * t) * t) + prbs(SAMPLES, 15, 0.4, 7)
+        drive = 0.4 * np.sin(2.0 * np.pi * (0.05 + 0.004 * t) * t) + prbs(SAMPLES, 15, 0.2, 7)
         return vehicle, Recording(name, t, {"f": drive}, name), np.zeros(2)
     dive = doublet(t, 10.0, 8.0, 0.1) + doublet(t, 45.0, 8.0, -0.1)
     apart = doublet(t, 25.0, 3.0, 0.1)

@@ -1,6 +1,8 @@
 """The reference: a page of every room, as pdoc makes it of docstrings."""
 
+import importlib
 import inspect
+import pkgutil
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,6 +38,9 @@ class Reference(NamedTuple):
     @classmethod
     def of(cls, package: str) -> "Reference":
         """Of a package as it is installed here."""
+        # imported before pdoc does, which forbids modules to ask the machine what it is
+        for found in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
+            importlib.import_module(found.name)
         modules = {name: pdoc.doc.Module.from_name(name) for name in pdoc.extract.walk_specs([package, *_BESIDE])}
         addresses = {}
         for name, module in modules.items():

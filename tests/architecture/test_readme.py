@@ -1,0 +1,81 @@
+"""Every table of measured numbers in the README names a command that makes it, and every command there exists."""
+
+import importlib.util
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from jaxsub.cli.app import app
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+EXPERIMENT = re.compile(r"python -m (experiments\.\w+)([^`\n]*)")
+
+
+def sections():
+    """Chapters by title, with their text."""
+    parts = re.split(r"^## (.*)$", README, flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def tables(text):
+    return re.findall(r"^\|.*(?:\n\|.*)+", text, re.MULTILINE)
+
+
+def measured(table):
+    """Whether a table has numbers in it."""
+    rows = table.splitlines()[2:]
+    return any(re.search(r"\d", cell) for row in rows for cell in row.strip("|").split("|")[1:])
+
+
+def experiments():
+    return sorted({(match[1], match[2].strip()) for match in EXPERIMENT.finditer(README)})
+
+
+def test_readme_has_tables_and_commands_to_look_at():
+    assert len([t for text in sections().values() for t in tables(text) if measured(t)]) >= 5
+    assert len(experiments()) >= 5
+
+
+@pytest.mark.parametrize("title", [t for t, text in sections().items() if any(map(measured, tables(text)))])
+def test_every_table_of_numbers_names_its_command(title):
+    text = sections()[title]
+    for table in filter(measured, tables(text)):
+        head, rows = table.splitlines()[0], table.splitlines()[2:]
+        if "command" in head:
+            for row in rows:
+                assert EXPERIMENT.search(row.rstrip("| ").rsplit("|", 1)[1]), f"no command in: {row[:80]}"
+        else:
+            assert EXPERIMENT.search(text[: text.index(table)]), f"no command before the table {head[:80]}"
+
+
+@pytest.mark.parametrize(("module", "options"), experiments())
+def test_every_command_exists_with_what_it_is_given(module, options):
+    spec = importlib.util.find_spec(f"{module}.__main__") or importlib.util.find_spec(module)
+    assert spec is not None, f"{module} cannot be run"
+    folder = Path(spec.origin).parent
+    source = "\n".join(
+        path.read_text(encoding="utf-8") for path in [*folder.glob("*.py"), ROOT / "experiments/parts.py"]
+    )
+    words = [word for word in shlex.split(options.partition(" until ")[0]) if word not in ("DIR",)]
+    for word in words:
+        if word.startswith("--"):
+            assert f'"{word}"' in source, f"{module} has no option {word}"
+        elif not re.fullmatch(r"[\d.]+", word):
+            assert re.search(rf"\b{re.escape(word)}\b", source), f"{module} knows nothing of {word}"
+
+
+BASH = "\n".join(re.findall(r"^```bash\n(.*?)^```", README, re.MULTILINE | re.DOTALL))
+
+
+@pytest.mark.parametrize("line", re.findall(r"^jaxsub .*$", BASH, re.MULTILINE))
+def test_every_command_of_jaxsub_is_understood(line):
+    words = shlex.split(line, comments=True)[1:]
+    assert app.commands[words[0]].make_context(words[0], words[1:]).params
+
+
+@pytest.mark.parametrize("picture", re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README))
+def test_every_picture_is_there(picture):
+    assert (ROOT / picture).is_file()
