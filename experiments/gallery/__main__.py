@@ -1,12 +1,13 @@
 """`python -m experiments.gallery --out DIR [--quick]`: a picture of every effect that a diagnosis may name.
 
 One manoeuvre of a catalogue vehicle (or a rig) is simulated with the effect and without it; DIR/NAME.png shows the
-channel in which it shows most, and DIR/results.json what was put in. `--quick` draws one effect of each family.
+channel that shows it, and DIR/results.json what was put in. What is there already is kept, so that an interrupted run
+goes on where it stopped. `--quick` draws one effect of each family.
 """
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -49,7 +50,7 @@ class Stage:
 def effect_of(scene: Scene, on: Stage) -> AbstractEffect:
     """The form that the scene asks for, of the size that it states or that moves its channel by `SHARE`."""
     form = next(e for e in on.candidates if e.name == scene.name and (not scene.label or f"[{scene.label}" in e.label))
-    stated = with_numbers(form, numbers(form) | scene.numbers)
+    stated = with_numbers(form, numbers(form) | dict(scene.numbers))
     free = [name for name in amplitudes(form) if name not in scene.numbers]
     if not free:
         return stated
@@ -68,8 +69,8 @@ def effect_of(scene: Scene, on: Stage) -> AbstractEffect:
     return sized(float(f"{low:.2g}"))
 
 
-def pictures(out: Path, quick: bool) -> Iterator[dict]:
-    """Draw each scene and say what it shows."""
+def pictures(out: Path, quick: bool, known: Mapping[str, dict]) -> Iterator[dict]:
+    """Draw each scene that is not `known`, and say of all what they show."""
     stages: dict[str, Stage] = {}
     families = {kind.name: kind.family for kind in VOCABULARY}
     seen = set()
@@ -78,6 +79,9 @@ def pictures(out: Path, quick: bool) -> Iterator[dict]:
         if quick and family in seen:
             continue
         seen.add(family)
+        if scene.name in known and (out / f"{scene.name}.png").is_file():
+            yield known[scene.name]
+            continue
         on = stages[scene.body] = stages.get(scene.body) or Stage(scene.body)
         effect = effect_of(scene, on)
         channel = on.vehicle.layout.channels.index(scene.channel)
@@ -108,9 +112,14 @@ def main() -> None:
     chosen = parser.parse_args()
     session.start()
     chosen.out.mkdir(parents=True, exist_ok=True)
-    found = list(pictures(chosen.out, chosen.quick))
-    text = json.dumps({"effects": found}, indent=1, ensure_ascii=False)
-    (chosen.out / "results.json").write_text(text, encoding="utf-8")
+    results = chosen.out / "results.json"
+    before = json.loads(results.read_text(encoding="utf-8"))["effects"] if results.is_file() else []
+    found = []
+    for row in pictures(chosen.out, chosen.quick, {row["name"]: row for row in before}):
+        found.append(row)
+        later = [other for other in before if other["name"] not in [one["name"] for one in found]]
+        text = json.dumps({"effects": found + later}, indent=1, ensure_ascii=False)
+        results.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -72,7 +72,7 @@ SCENES = (
     Scene("sensor-delay", "r", "r", {"tau": 1.0}),
     Scene("sensor-misalignment", "q", "q,r", {"epsilon": 0.2}),
     Scene("sensor-lever-arm", "v", "v,x", {"arm": 1.0}),
-    Scene("sensor-saturation", "r", "r", {"limit": 0.1}),
+    Scene("sensor-saturation", "r", "r", {"limit": 0.06}),
     Scene("sensor-rectification", "r", "r", {"f": 1.0}),
     Scene("sensor-drift", "r", "r"),
 )

@@ -44,15 +44,22 @@ def demo(out: Path, seed: int, overwrite: bool) -> None:
 @_runs
 @_out(required=True)
 @click.option("--method", type=click.Choice(METHODS), default=METHODS[0], show_default=True)
+@click.option("--posterior", is_flag=True, help="Draw from the posterior too, into posterior.nc.")
 @_columns
 @_overwrite
 def identify(
-    vehicle: Path, runs: tuple[Path, ...], out: Path, method: str, columns: Path | None, overwrite: bool
+    vehicle: Path,
+    runs: tuple[Path, ...],
+    out: Path,
+    method: str,
+    posterior: bool,
+    columns: Path | None,
+    overwrite: bool,
 ) -> None:
     """Estimate the free coefficients, with standard errors and identifiability."""
     from . import identify as command
 
-    command.run(vehicle, runs, out, method, overwrite, columns)
+    command.run(vehicle, runs, out, method, overwrite, columns, posterior)
 
 
 @app.command()

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from ..discrepancy import batch
 from ..errors import InputError
-from ..estimate import METHODS, Fit, fit
+from ..estimate import METHODS, Fit, fit, posterior
 from ..identifiability import Coloured, Identifiability, Verdict, coloured_covariance, identifiability
 from ..results import RESULTS
 from ..vehicle import read_vehicle, write_vehicle
@@ -21,11 +21,17 @@ from .output import fresh_folder, refuse_existing
 
 
 def run(
-    vehicle_path: Path, runs: Sequence[Path], out: Path, method: str, overwrite: bool, columns: Path | None = None
+    vehicle_path: Path,
+    runs: Sequence[Path],
+    out: Path,
+    method: str,
+    overwrite: bool,
+    columns: Path | None = None,
+    drawn: bool = False,
 ) -> None:
     """Fit the vehicle to the recordings by `method`; write `fitted.toml`, `coefficients.csv`, `identification.json`.
 
-    Of logs the file at `columns` says what to take.
+    Of logs the file at `columns` says what to take. Where it is to be `drawn` from, the posterior is in `posterior.nc`.
     """
     session.start()
     refuse_existing(out, overwrite)
@@ -40,6 +46,9 @@ def run(
         told("asking what the recordings identify")
         said, coloured = identifiability(found), coloured_covariance(found)
         _write(found, said, coloured, method, folder)
+        if drawn:
+            told("drawing from the posterior")
+            posterior(found).to_netcdf(folder / "posterior.nc", engine="h5netcdf")
     _show(found, said, coloured)
 
 

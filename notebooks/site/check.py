@@ -29,8 +29,8 @@ def _faults(path: Path, page: str, ids: dict[Path, set[str]]) -> Iterator[str]:
     for picture in re.findall(r"<img\b[^>]*>", page):
         if "alt=" not in picture:
             yield f"a picture without a word for it: {picture[:60]}"
-    for rest in re.findall(r"[^$]{0,30}\$[^$]{0,30}", _CODE.sub("", page)):
-        yield f"mathematics that was not set: {rest.strip()}"
+    if rest := re.search(r"[^$]{0,30}\$[^$]{0,30}", _CODE.sub("", page)):
+        yield f"mathematics that was not set: {rest[0].strip()}"
 
 
 def _leads_nowhere(page: Path, address: str, ids: dict[Path, set[str]]) -> str:

@@ -79,7 +79,7 @@ def _guide(name: str, reference: Reference) -> Page:
 
 
 def _lesson(path: Path) -> Page:
-    exporter = nbconvert.HTMLExporter(template_name="basic", exclude_input_prompt=True, exclude_output_prompt=True)
+    exporter = nbconvert.HTMLExporter(template_name="basic", exclude_anchor_links=True)
     body, _ = exporter.from_filename(str(path))
     title = re.search(r'"# ([^"\\]+)', path.read_text(encoding="utf-8"))
     return Page(f"{path.stem}.html", title[1] if title else path.stem, mathematics.in_html(body))

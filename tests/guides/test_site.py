@@ -44,7 +44,8 @@ def test_missing_docstrings_are_faults():
 
     bare = types.ModuleType("jaxsub.bare")
     exec("def spoken():\n    'Says.'\n\n\ndef silent():\n    pass\n", bare.__dict__)
-    for name in ("spoken", "silent"):
+    bare.__all__ = ["spoken", "silent"]
+    for name in bare.__all__:
         bare.__dict__[name].__module__ = "jaxsub.bare"
     found = Reference({"jaxsub.bare": pdoc.doc.Module(bare)}, {}).undocumented()
     assert found == ["jaxsub.bare: has no docstring", "jaxsub.bare.silent: has no docstring"]
