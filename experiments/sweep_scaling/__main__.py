@@ -9,6 +9,7 @@ and so do two workers: on two cores the three differ by their overheads alone.
 
 import dataclasses
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -31,6 +32,7 @@ ENGINES = ("one_device", "two_devices", "two_workers")
 _PARTS = (*ENGINES, "agreement", "memory", "figure")
 # searches in the chunks of a sweep that is split in another way
 _OTHER = 48
+_TWO = "--xla_force_host_platform_device_count=2"
 _NUMBERS = ("initial_guess", "estimate", "standard_error", "cost", "coordinates")
 
 
@@ -41,9 +43,10 @@ def sizes(quick: bool) -> list[int]:
 
 def part(name: str, out: Path, quick: bool) -> dict:
     """One part's results."""
-    if name == "two_devices":
-        # read when the first array is made, which is later
-        os.environ["XLA_FLAGS"] = "--xla_force_host_platform_device_count=2"
+    if name == "two_devices" and os.environ.get("XLA_FLAGS") != _TWO:
+        # XLA reads its flags once, before this is reached: begin again with them
+        command = [sys.executable, "-m", "experiments.sweep_scaling", *sys.argv[1:]]
+        os.execve(sys.executable, command, os.environ | {"XLA_FLAGS": _TWO})
     if name == "two_workers":
         settings = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
         started: Any = distributed.LocalCluster(processes=True, **settings)
