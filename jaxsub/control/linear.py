@@ -52,7 +52,6 @@ def linearise(plant: Plant, x: Float[Array, " s"], u: Float[Array, " m"], time: 
     return _named(plant, plant.jacobians(x, u, time), x, u, plant.output(x, u, time), drift, plant.dt)
 
 
-@eqx.filter_jit
 def linearise_rates(plant: Plant, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> LinearPlant:
     """The model of which `plant` is the sampled form, in continuous time, about a point.
 
@@ -61,7 +60,11 @@ def linearise_rates(plant: Plant, x: Float[Array, " s"], u: Float[Array, " m"], 
     if any(plant.sizes):
         kept = ", ".join(plant.states[plant.own :])
         raise InputError(plant.vehicle.layout.name, f"keeps samples ({kept})", "linearise its step instead")
+    return _rates_about(plant, x, u, time)
 
+
+@eqx.filter_jit
+def _rates_about(plant: Plant, x: Array, u: Array, time: Time) -> LinearPlant:
     def rates(x: Array, u: Array) -> Array:
         signals = plant.acting(u, time)
         moved = plant.vehicle.position_rates(plant.vehicle.motion(x, signals))
@@ -78,7 +81,6 @@ def _named(plant: Plant, of: Jacobians, x: Array, u: Array, y: Array, drift: Arr
     return LinearPlant(of.A, of.B, of.C, of.D, x, u, y, drift, dt, *names)
 
 
-@eqx.filter_jit
 def linearisation_error(
     plant: Plant, linear: LinearPlant, inputs: Float[Array, "k m"], time: Time = 0.0
 ) -> Float[Array, " s"]:
@@ -88,7 +90,11 @@ def linearisation_error(
     """
     if not linear.dt:
         raise InputError(plant.vehicle.layout.name, "is linear in continuous time", "compare that of linearise")
+    return _apart(plant, linear, inputs, time)
 
+
+@eqx.filter_jit
+def _apart(plant: Plant, linear: LinearPlant, inputs: Array, time: Time) -> Float[Array, " s"]:
     def on(x: Array, u: Array) -> tuple[Array, Array]:
         after = linear.step(x, u)
         return after, after
