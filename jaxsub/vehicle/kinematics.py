@@ -2,10 +2,27 @@
 
 from collections.abc import Mapping
 
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 from ..effects import GRAVITY, Motion, Signal
+
+
+@jax.custom_jvp
+def sine_cosine(angle: Float[Array, " *k"]) -> tuple[Float[Array, " *k"], Float[Array, " *k"]]:
+    """Sine and cosine of `angle` (rad), worked out once.
+
+    Without the barrier XLA fuses both into everything that uses them and works them out again in each: eighty times in
+    a step in place of sixteen, which was a third of the time that a batch of simulations took.
+    """
+    return jax.lax.optimization_barrier((jnp.sin(angle), jnp.cos(angle)))
+
+
+@sine_cosine.defjvp
+def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    sine, cosine = sine_cosine(*primals)
+    return (sine, cosine), (cosine * tangents[0], -sine * tangents[0])
 
 
 def position_rates(motion: Motion) -> dict[str, Signal]:
@@ -16,7 +33,7 @@ def position_rates(motion: Motion) -> dict[str, Signal]:
     """
     u, v, w, p, q, r = (motion.rates[e] for e in ("surge", "sway", "heave", "roll", "pitch", "yaw"))
     phi, theta, psi = (motion.positions[name] for name in ("phi", "theta", "psi"))
-    sin_phi, cos_phi, sin_theta, cos_theta = jnp.sin(phi), jnp.cos(phi), jnp.sin(theta), jnp.cos(theta)
+    (sin_phi, cos_phi), (sin_theta, cos_theta) = sine_cosine(jnp.asarray(phi)), sine_cosine(jnp.asarray(theta))
     turning = (q * sin_phi + r * cos_phi) / cos_theta
     across = v * cos_phi - w * sin_phi
     ahead = u * cos_theta + (v * sin_phi + w * cos_phi) * sin_theta

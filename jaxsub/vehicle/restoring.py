@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..effects import GRAVITY, Signal
+from .kinematics import sine_cosine
 
 STANDARD_DENSITY = 1025.0
 
@@ -33,7 +34,8 @@ class Restoring(eqx.Module):
         """Generalised force by equation at the attitude `phi`, `theta` (rad) and displaced weight `buoyancy` (N)."""
         excess = self.values["weight"] - buoyancy
         x, y, z = (self.values[name] * buoyancy for name in ("x_B", "y_B", "z_B"))
-        level, rolled, pitched = jnp.cos(phi) * jnp.cos(theta), jnp.sin(phi) * jnp.cos(theta), jnp.sin(theta)
+        (sin_phi, cos_phi), (pitched, cos_theta) = sine_cosine(jnp.asarray(phi)), sine_cosine(jnp.asarray(theta))
+        level, rolled = cos_phi * cos_theta, sin_phi * cos_theta
         return {
             "surge": -excess * pitched,
             "sway": excess * rolled,
