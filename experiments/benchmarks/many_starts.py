@@ -6,6 +6,7 @@ Both take the same damped Gauss-Newton steps from the same starts to the same to
 import multiprocessing
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import jax
@@ -66,10 +67,10 @@ def run(out: Path, quick: bool) -> dict:
 def _two_processes(case: Case, starts: np.ndarray) -> dict:
     context = multiprocessing.get_context("spawn")
     shares = np.array_split(starts, 2)
-    with tempfile.TemporaryDirectory() as folder, context.Pool(2, _begin, (case, folder)) as pool:
-        compile_s = max(pool.map(_warm, [share[:1] for share in shares], chunksize=1))
+    with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(2, context, _begin, (case, folder)) as pool:
+        compile_s = max(pool.map(_warm, [share[:1] for share in shares]))
         begin = time.perf_counter()
-        parts = pool.map(_share, shares, chunksize=1)
+        parts = list(pool.map(_share, shares))
         seconds = time.perf_counter() - begin
     ends: list[End] = [end for part in parts for end in part]
     return {
