@@ -142,7 +142,6 @@ ELEMENTWISE: dict[str, Callable[..., Scalar]] = {
     "clamp": lambda low, x, high: _min(_max(x, low), high),
     "copy": lambda x: x,
     "stop_gradient": lambda x: x,
-    "optimization_barrier": lambda x: x,
 }
 
 # two by two, for reductions and running sums

@@ -272,6 +272,11 @@ def _linear_solve(params: dict, operands: Arrays) -> Arrays:
     return [solved(settled(np.stack(columns)), b.ravel()).reshape(b.shape)]
 
 
-_CONTROL: dict[str, Callable[[dict, Arrays], Arrays]] = {"cond": _branches, "scan": _scan, "while": _while}
+_CONTROL: dict[str, Callable[[dict, Arrays], Arrays]] = {
+    "cond": _branches,
+    "scan": _scan,
+    "while": _while,
+    "optimization_barrier": lambda params, operands: operands,
+}
 _ARRAYS["dynamic_slice"] = _slice
 _ARRAYS["dynamic_update_slice"] = lambda params, x: update_at(x[0], x[1], [start.item() for start in x[2:]])

@@ -46,6 +46,7 @@ FUNCTIONS = {
     "branches": lambda x: jax.lax.switch(jnp.argmax(x), [lambda v: v, lambda v: 2.0 * v, jnp.sin, jnp.cos], x),
     "a known branch": lambda x: jax.lax.cond(A[0, 0] > 5.0, jnp.sin, jnp.cos, x),
     "loops": _carried,
+    "a barrier": lambda x: sum(jax.lax.optimization_barrier((jnp.sin(x), jnp.cos(x)))),
     "a known number of turns": _powers,
     "cholesky": lambda x: jnp.linalg.cholesky(POSITIVE + jnp.outer(x, x))[jnp.tril_indices(4)],
     "triangles": lambda x: jax.scipy.linalg.solve_triangular(jnp.tril(A) + 3.0 * jnp.eye(4), x, lower=True, trans=1),
