@@ -9,8 +9,10 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 
 _OURS, _PEER = "#1f4e79", "#b5482a"
+_SUBJECTS = {"samples": _OURS, "batch": _PEER, "coefficients": "#5a8f3c", "candidates": "#7a5aa6"}
 
 
 def run(out: Path, quick: bool) -> dict:
@@ -56,7 +58,7 @@ def _fits(fits: Mapping[str, dict]) -> dict[str, float]:
     return rows
 
 
-def _bars(axis: plt.Axes, rows: Mapping[str, float], title: str, floor: float | None = None) -> None:
+def _bars(axis: Axes, rows: Mapping[str, float], title: str, floor: float | None = None) -> None:
     names = list(rows)[::-1]
     values = [rows[name] for name in names]
     axis.barh(names, values, color=[_OURS if "jaxsub" in name else _PEER for name in names], height=0.62)
@@ -71,8 +73,9 @@ def _bars(axis: plt.Axes, rows: Mapping[str, float], title: str, floor: float | 
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def _growth(axis: plt.Axes, grown: Mapping[str, dict]) -> None:
-    for (what, rows), colour in zip(grown.items(), (_OURS, _PEER, "#5a8f3c", "#7a5aa6"), strict=True):
+def _growth(axis: Axes, grown: Mapping[str, dict]) -> None:
+    for what, colour in _SUBJECTS.items():
+        rows = grown[what]
         sizes = np.array([int(size) for size in rows["rows"]])
         spent = [np.array([row[key] for row in rows["rows"].values()]) for key in ("s", "least_s", "most_s")]
         axis.fill_between(sizes, spent[1], spent[2], color=colour, alpha=0.2, lw=0.0)
