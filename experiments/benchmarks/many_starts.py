@@ -34,20 +34,21 @@ def run(out: Path, quick: bool) -> dict:
     pin(2)
     problem, case = problem_and_case()
     starts = np.asarray(scattered(problem, SPREAD, COUNT, SEED))
-    sweep = lambda count: gauss_newton().run(problem, jnp.asarray(starts[:count]))
-    # over both cores even a small sweep, as the large one is: a program is compiled for a number of starts
+    sweep = lambda chosen: gauss_newton().run(problem, jnp.asarray(chosen))
     session.console.print("many_starts: jaxsub …", highlight=False)
-    compiling = once(lambda: sweep(_TRIAL))[1]
-    trial = once(lambda: sweep(_TRIAL))[1]
-    count = _TRIAL if quick else int(min(COUNT, _LIMIT / (trial / _TRIAL)))
-    count -= count % 2
-    found, seconds = once(lambda: sweep(count))
-    if count != _TRIAL:
-        # the first call of this size compiled as well
-        seconds = min(seconds, once(lambda: sweep(count))[1]) if seconds < 0.5 * _LIMIT else seconds
-    ours = {"starts": count, "compile_s": compiling - trial, "seconds": seconds, "cost": np.asarray(found.cost)}
+    some = starts[: 4 if quick else _TRIAL]
+    (found, first), count = once(lambda: sweep(some)), len(some)
+    found, seconds = once(lambda: sweep(some))
+    compiling = first - seconds
+    if not quick:
+        count = 2 * int(min(COUNT, _LIMIT / (seconds / _TRIAL)) / 2)
+        # a program is for a number of starts: it is compiled on as many that are at the end already
+        end = np.asarray(found.y)[np.nanargmin(np.asarray(found.cost))]
+        compiling = once(lambda: sweep(np.tile(end, (count, 1))))[1]
+        found, seconds = once(lambda: sweep(starts[:count]))
+    ours = {"starts": count, "compile_s": compiling, "seconds": seconds, "cost": np.asarray(found.cost)}
     session.console.print("many_starts: CasADi …", highlight=False)
-    theirs = _two_processes(case, starts[: _TRIAL if quick else COUNT])
+    theirs = _two_processes(case, starts[: len(some) if quick else COUNT])
     best = min(np.nanmin(ours["cost"]), np.nanmin(theirs["cost"]))
     for row in (ours, theirs):
         cost = row.pop("cost")
