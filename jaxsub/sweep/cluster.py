@@ -71,11 +71,15 @@ def _distributed() -> Any:
 def _client(distributed: Any, address: str) -> Iterator[Any]:
     if address == LOCAL:
         settings = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.ERROR}
-        with distributed.LocalCluster(processes=True, **settings) as cluster, distributed.Client(cluster) as client:
+        with (
+            distributed.LocalCluster(processes=True, **settings) as cluster,
+            distributed.Client(cluster, set_as_default=False) as client,
+        ):
             yield client
         return
     try:
-        client = distributed.Client(address, timeout=_PATIENCE)
+        # a default client would take over whatever this program computes by Dask, and stays so where it finds nobody
+        client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         remedy = "give the address of a Dask scheduler, such as tcp://10.0.0.1:8786, or local"
         raise InputError(f"--cluster {address}", "no scheduler answers there", remedy) from error

@@ -25,11 +25,13 @@ def written(path, folder):
     return [name for name, _ in found]
 
 
-@pytest.mark.parametrize("path", [p for p in GUIDES if blocks(p, "python")], ids=lambda path: path.stem)
+def marked(path):
+    # the posterior's other tests draw from it too, and its guide takes a minute
+    return pytest.param(path, id=path.stem, marks=[pytest.mark.long] if path.stem == "posterior" else [])
+
+
+@pytest.mark.parametrize("path", [marked(p) for p in GUIDES if blocks(p, "python")])
 def test_code_of_a_guide_runs(path, tmp_path, monkeypatch, capsys):
-    if path.stem == "posterior":
-        pytest.importorskip("numpyro")
-        pytest.importorskip("arviz")
     monkeypatch.chdir(tmp_path)
     written(path, tmp_path)
     code = [block for block in blocks(path, "python") if not re.match(r"# \w+\.py\n", block)]

@@ -6,6 +6,7 @@ import socket
 import threading
 import time
 
+import dask
 import jax
 import pytest
 from sweep_cases import environment, farthest, plan
@@ -68,3 +69,5 @@ def test_no_scheduler_is_said_in_one_line(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="no scheduler answers"):
         sweep(plan(), tmp_path / "out", cluster=address)
     assert jax.config.jax_enable_x64
+    # nor does what else this process computes by Dask now ask for the scheduler that was not there
+    assert dask.config.get("scheduler", None) is None
