@@ -38,7 +38,7 @@ def load(path):
         raise ValueError(
             f"{path}: is no exported plant ({error}); export one with jaxsub.control.export_plant"
         ) from None
-    if about["dtype"] == "float64" and not jax.config.jax_enable_x64:
+    if about["dtype"] == "float64" and jax.numpy.result_type(float) != "float64":
         raise ValueError(f'{path}: has 64-bit numbers; call jax.config.update("jax_enable_x64", True) first')
     number = lambda values: jax.numpy.asarray(values, about["dtype"])
 

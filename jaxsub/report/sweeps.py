@@ -72,7 +72,7 @@ def _telling(case: xarray.Dataset) -> list[str]:
     """Coefficients that were searched for, those with the widest spread of ends first."""
     ends = np.asarray(case.estimate.transpose("noise", "start", "coefficient")).reshape(-1, case.sizes["coefficient"])
     scale = np.abs(np.asarray(case.file_value))
-    finite = np.isfinite(ends).any(0)
+    finite = np.any(np.isfinite(ends), axis=0)
     width = np.where(finite, _width(np.where(finite, ends, 0.0)) / np.where(scale > 0.0, scale, 1.0), -1.0)
     order = [i for i in np.argsort(-width, kind="stable") if finite[i]][:_MOST_COEFFICIENTS]
     return [str(case.coefficient.values[i]) for i in order]

@@ -101,6 +101,6 @@ def _coefficients(rows: list, case: xarray.Dataset, best: np.ndarray) -> dict[st
     return told
 
 
-def _number(value: float) -> float | None:
+def _number(value: float | np.floating) -> float | None:
     """A number as JSON has it, which knows neither NaN nor infinity."""
     return float(value) if np.isfinite(value) else None

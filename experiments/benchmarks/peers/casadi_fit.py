@@ -25,9 +25,9 @@ class SingleShooting:
         self.states, self.columns = np.zeros((count, 10)), np.zeros((count, p + 10, 10))
         self.buffer, self.evaluate = self.function.buffer()
         for index, array in enumerate(self.given):
-            self.buffer.set_arg(index, memoryview(array))  # pyright: ignore[reportCallIssue]
+            self.buffer.set_arg(index, memoryview(array))  # pyright: ignore
         for index, array in enumerate((self.states, self.columns)):
-            self.buffer.set_res(index, memoryview(array))  # pyright: ignore[reportCallIssue]
+            self.buffer.set_res(index, memoryview(array))  # pyright: ignore
 
     def expand(self, z: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         """The cost (priors included), its gradient (d,) and J^T J (d, d) at the coordinates `z`."""
