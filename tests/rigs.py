@@ -4,10 +4,14 @@ from typing import Any
 
 import numpy as np
 
+from jaxsub.effects import Facts, candidates, with_numbers
 from jaxsub.recording import Recording
 from jaxsub.recording.runs import Runs, stack_runs
 from jaxsub.simulate import prbs, synthetic
 from jaxsub.vehicle import AbstractVehicle, Mechanism, vehicle_from
+
+# one over what is a usual size, where others are of the order of a hundredth
+_SMALL = {"hull-compressibility": 3e9, "thermal-expansion": 3e4, "density-stratification": 3e4}
 
 
 def stacked(vehicle: AbstractVehicle, recordings: list[Recording], substeps: int = 1) -> Runs:
@@ -53,3 +57,45 @@ def coupled() -> Mechanism:
     values |= {"K_a": 3.0, "K_b": 5.0, "K_a_b": -1.0, "B_a_drive": 1.0, "F_b": 0.2}
     outputs = {"a": {"sigma": 0.01}, "b": {"sigma": 0.01}, "b_rate": {"sigma": "estimate"}}
     return oscillator(name="coupled", dof=["a", "b"], coefficients=values, outputs=outputs)
+
+
+def body():
+    """Six degrees of freedom with every actuator, an altitude and sensors of every kind."""
+    damping = {"X_u": -15.0, "Y_v": -80.0, "Z_w": -80.0, "K_p": -8.0, "M_q": -30.0, "N_r": -30.0, "N_v": -10.0}
+    added = {"X_udot": -5.0, "Y_vdot": -60.0, "Z_wdot": -60.0, "M_qdot": -20.0, "N_rdot": -20.0}
+    fins = {"Y_delta_r": 20.0, "N_delta_r": -15.0, "Z_delta_e": -20.0, "M_delta_e": -15.0}
+    channels = ("u", "v", "r", "q", "phi", "theta", "psi", "depth", "ax", "az", "y")
+    return vehicle_from(
+        {
+            "schema": 1, "name": "body", "kind": "submerged-body",
+            "body": {"mass": 60.0, "inertia": [1.0, 12.0, 12.0], "speed": 1.5, "centre_of_buoyancy": [0.0, 0.0, -0.02]},
+            "coefficients": damping | added | fins,
+            "inputs": {"rudder": "dr", "elevator": "de", "thrust": "T"},
+            "environment": {"altitude": "h", "temperature": "C"},
+            "outputs": {channel: {"sigma": 0.01} for channel in channels},
+        },
+        "body.toml",
+    )  # fmt: skip
+
+
+def _facts(vehicle):
+    layout = vehicle.layout
+    every = lambda names, value: dict.fromkeys(names, value)
+    inputs = tuple(name for name, _ in layout.inputs)
+    coordinates = every(layout.equations, 0.2) if layout.kind == "mechanism" else {}
+    return Facts(
+        layout.kind, layout.equations, inputs, layout.channels, tuple(name for name, _ in layout.environment),
+        layout.length, layout.diameter, every(layout.equations, 0.3), 0.1, 2.0, coordinates,
+        every(inputs, (0.1, 0.2, 1.0)), every(layout.channels, (0.0, 0.2)), (0.0, 2.0),
+        every(layout.equations, (1.0,)), 9,
+    )  # fmt: skip
+
+
+def chosen(vehicle):
+    """One effect of each kind that fits the vehicle, every number other than its default and of the sign of physics."""
+    first = {}
+    for effect in candidates(_facts(vehicle)):
+        first.setdefault(type(effect), effect)
+    size = lambda effect, i, sign: (sign or 1) * (i + 1.0) / _SMALL.get(effect.name, 37.0)
+    sizes = lambda effect: {name: size(effect, i, sign) for i, (name, sign) in enumerate(effect.signs().items())}
+    return [with_numbers(effect, sizes(effect)) for effect in first.values()]

@@ -123,6 +123,7 @@ def channels(log: Path, words: tuple[str, ...]) -> None:
 @click.option("--apart", is_flag=True, help="Fit every run on its own instead of all together.")
 @click.option("--method", type=click.Choice(METHODS), default=METHODS[0], show_default=True)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True, help="Of all draws.")
+@click.option("--compiled", is_flag=True, help="By C made of the model: many times faster; needs .[control] and cc.")
 @click.option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local for one worker a core of this machine.")
 @_overwrite
 def sweep(out: Path, overwrite: bool, **arguments: Any) -> None:

@@ -37,6 +37,7 @@ class Asked:
     apart: bool
     method: str
     seed: int
+    compiled: bool
     cluster: str | None
 
 
@@ -102,6 +103,7 @@ def make_plan(asked: Asked) -> Plan:
         noise=range(asked.noise_seeds),
         seed=asked.seed,
         method=asked.method.replace("-", "_"),
+        compiled=asked.compiled,
     )
 
 

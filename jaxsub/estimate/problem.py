@@ -1,5 +1,6 @@
 """A fit as a least-squares problem in unbounded, scaled coordinates."""
 
+import dataclasses
 from collections.abc import Callable
 
 import equinox as eqx
@@ -10,6 +11,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..effects import CHANNEL_UNITS, VELOCITIES
 from ..likelihood import errors
+from ..likelihood.march import March
 from ..parameters import Transform
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
@@ -20,6 +22,8 @@ from .newton import second_order
 _SPREAD = {"m/s": 1.0, "rad/s": 0.5, "rad": 0.5, "m": 10.0}
 # of what an effect remembers, which starts at zero
 _MEMORY = 0.1
+# how far from the origin two points show which numbers the parameters move
+_NEAR = 0.1
 
 
 class Problem(eqx.Module):
@@ -33,6 +37,7 @@ class Problem(eqx.Module):
       false. `prior_mean`, `prior_std`: (p,), the latter infinite where there is none.
     - `guess`, `spread`: (R, s) and (s,) Gaussian prior of the initial states; a known one has no spread.
     - `known_start`: whether initial states are known, and no coordinates.
+    - `march`: where there is one, cost and expansion come from compiled C, and have no further derivatives.
     """
 
     vehicle: AbstractVehicle
@@ -46,6 +51,7 @@ class Problem(eqx.Module):
     guess: Float[Array, "r s"]
     spread: Float[Array, " s"]
     known_start: bool = eqx.field(static=True)
+    march: March | None = eqx.field(static=True, default=None)
 
     @classmethod
     def of(
@@ -85,13 +91,26 @@ class Problem(eqx.Module):
             known_start,
         )
 
+    def in_c(self) -> "Problem":
+        """The same problem on compiled C: for many searches, or one that is waited for.
+
+        **Raises** `InputError` as `March` does.
+        """
+        rng = np.random.default_rng(0)
+        free = dataclasses.replace(self, moving=jnp.ones_like(self.moving))
+        near = lambda: self.origin + jnp.asarray(_NEAR * rng.standard_normal(len(self.origin)))
+        march = March(free.vehicle_at, (near(), near()), self.runs, start=not self.known_start)
+        return dataclasses.replace(self, march=march)
+
     def split(self, y: Float[Array, " d"]) -> tuple[AbstractVehicle, Float[Array, "r s"]]:
         """The vehicle and the initial states that the coordinates `y` stand for."""
-        p = len(self.prior_mean)
+        return self.vehicle_at(y[: len(self.prior_mean)]), self.guess + self.spread * self.moved(y)
+
+    def vehicle_at(self, y: Float[Array, " p"]) -> AbstractVehicle:
+        """The vehicle that the coordinates `y` of the parameters stand for."""
         names = [row.name for row in self.vehicle.layout.free]
-        theta = self.transform.to_physical(jnp.where(self.moving, y[:p], self.origin))
-        vehicle = self.vehicle.with_values(dict(zip(names, theta, strict=True)))
-        return vehicle, self.guess + self.spread * self.moved(y)
+        theta = self.transform.to_physical(jnp.where(self.moving, y, self.origin))
+        return self.vehicle.with_values(dict(zip(names, theta, strict=True)))
 
     def moved(self, y: Float[Array, " d"]) -> Float[Array, "r s"]:
         """How far the initial states at `y` are from their guess, in their spreads."""
@@ -112,31 +131,44 @@ class Problem(eqx.Module):
 
     def cost(self, y: Float[Array, " d"]) -> Float[Array, ""]:
         r"""$\tfrac12\sum$ residuals²: minus the log-likelihood, up to its constant."""
-        return 0.5 * jnp.sum(self.residuals(y) ** 2)
+        if self.march is None:
+            return 0.5 * jnp.sum(self.residuals(y) ** 2)
+        start = self.guess + self.spread * self.moved(y)
+        squares = self.march.squares(self.vehicle_at, y[: len(self.prior_mean)], start, self.runs, self.sigma)
+        return 0.5 * (jnp.sum(squares) + jnp.sum(_prior(self, y) ** 2))
 
     def expand(self, y: Float[Array, " d"]) -> "Expansion":
-        """The cost about `y` to second order, its curvature by Gauss and Newton: $J^TJ$.
+        """The cost about `y` to second order, its curvature by Gauss and Newton: $J^TJ$."""
+        p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
+        gram = self.products(y)
+        prior, slopes = _value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
+        own = gram[:, p:-1, p:-1] + jnp.eye(s)
+        mixed = jnp.moveaxis(gram[:, :p, p:-1], 0, 1).reshape(p, len(y) - p)
+        among = jnp.sum(gram[:, :p, :p], axis=0) + slopes.T @ slopes
+        hessian = jnp.block([[among, mixed], [mixed.T, jax.scipy.linalg.block_diag(*own)]]) if s else among
+        by_theta = jnp.sum(gram[:, :p, -1], axis=0) + slopes.T @ prior
+        by_start = gram[:, p:-1, -1].ravel() + y[p:]
+        cost = 0.5 * (jnp.sum(gram[:, -1, -1]) + jnp.sum(prior**2) + jnp.sum(y[p:] ** 2))
+        return Expansion(cost, jnp.concatenate([by_theta, by_start]), hessian)
+
+    def products(self, y: Float[Array, " d"]) -> Float[Array, "r q q"]:
+        """Products of each run's whitened columns: by the parameters, by its own initial state, and the error.
 
         Runs do not feel each other's initial states, so one tangent a state serves every run: p + s simulations instead
         of p + R s.
         """
         p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
         still = jnp.zeros(len(self.spread))
+        if self.march is not None:
+            start = self.guess + self.spread * self.moved(y)
+            return self.march.products(self.vehicle_at, y[:p], start, self.spread, self.runs, self.sigma)
 
         def shown(change: Array) -> Array:
             return _outputs(self, y.at[:p].add(change[:p]), still.at[:s].add(change[p:]))
 
         error, columns = _value_and_columns(shown, jnp.zeros(p + s))
-        prior, slopes = _value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
-        theta, start = columns[..., :p], columns[..., p:]
-        own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(s)
-        mixed = jnp.einsum("rkcp,rkcs->prs", theta, start).reshape(p, len(y) - p)
-        among = jnp.einsum("rkcp,rkcq->pq", theta, theta) + slopes.T @ slopes
-        hessian = jnp.block([[among, mixed], [mixed.T, jax.scipy.linalg.block_diag(*own)]]) if s else among
-        by_theta = jnp.einsum("rkcp,rkc->p", theta, error) + slopes.T @ prior
-        by_start = jnp.einsum("rkcs,rkc->rs", start, error).ravel() + y[p:]
-        cost = 0.5 * (jnp.sum(error**2) + jnp.sum(prior**2) + jnp.sum(y[p:] ** 2))
-        return Expansion(cost, jnp.concatenate([by_theta, by_start]), hessian)
+        every = jnp.concatenate([columns, error[..., None]], axis=-1)
+        return jnp.einsum("rkca,rkcb->rab", every, every)
 
     def expand_exactly(self, y: Float[Array, " d"]) -> "Expansion":
         """The cost about `y` to second order, its curvature exact."""

@@ -23,6 +23,8 @@ from ..vehicle import AbstractVehicle
 # files in a folder that every notebook still opens at once
 _FILES = 500
 _STARTS, _NOISE = 0, 1
+# methods that ask for no more than a problem on C gives
+_ON_C = ("gauss_newton", "nelder_mead")
 # the random numbers are those of this generator, whichever a program may have chosen for itself
 _GENERATOR = "threefry2x32"
 
@@ -52,8 +54,10 @@ class Plan:
     - `seed`: of all draws. `method`: a name in `estimate.METHODS`.
     - `sigma`: (c,) noise of the channels for each case, SI; that of the vehicle file where it is None.
     - `width`: searches in a chunk, for each case; as `chunk_width` has it where it is None.
+    - `compiled`: whether each worker makes C of its problems (`Problem.in_c`): the same answers, many times faster,
+      where the method takes no further derivatives.
 
-    **Raises** `InputError` for an axis without a value and for a method that there is not.
+    **Raises** `InputError` for an axis without a value, for a method that there is not and for one that C cannot serve.
     """
 
     vehicles: Mapping[str, AbstractVehicle]
@@ -65,6 +69,7 @@ class Plan:
     method: str = "gauss_newton"
     sigma: Sequence[Sequence[float]] | None = None
     width: Sequence[int] | None = None
+    compiled: bool = False
 
     def __post_init__(self):
         for axis, size in {"vehicles": len(self.vehicles), "recordings": len(self.recordings)}.items():
@@ -78,6 +83,12 @@ class Plan:
             raise InputError("sweep: seeds", "are not different numbers from 0 to 2³¹ - 1", "give others")
         if self.method not in METHODS:
             raise InputError("sweep: method", f"there is no {self.method!r}", f"choose among {', '.join(METHODS)}")
+        if self.compiled and self.method not in _ON_C:
+            raise InputError("sweep: method", f"{self.method} takes derivatives that C has not", f"choose {_ON_C[0]}")
+
+    def __getstate__(self) -> dict:
+        """Without the problems, which are made anew where they are wanted: their C is a machine's own."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @property
     def cases(self) -> list[tuple[str, str]]:
@@ -97,7 +108,8 @@ class Plan:
             vehicle = self.vehicles[name]
             known = None if self.sigma is None else jnp.asarray(self.sigma[index])
             sigma = jnp.array([output.sigma or 1.0 for output in vehicle.layout.outputs]) if known is None else known
-            made.append(Problem.of(vehicle, batch(vehicle, self.recordings[recorded]), sigma))
+            problem = Problem.of(vehicle, batch(vehicle, self.recordings[recorded]), sigma)
+            made.append(problem.in_c() if self.compiled else problem)
         return made
 
     def settled(self) -> "Plan":

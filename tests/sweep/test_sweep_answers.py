@@ -1,6 +1,7 @@
 """The answers of a sweep are those of single fits and of SciPy, however the sweep was split."""
 
 import json
+import pickle
 import subprocess
 import sys
 
@@ -11,6 +12,7 @@ from scipy.optimize import least_squares
 from sweep_cases import environment, farthest, plan, recordings, vehicle
 
 from jaxsub.discrepancy import batch
+from jaxsub.errors import InputError
 from jaxsub.estimate import fit
 from jaxsub.sweep import OUTCOMES, answered, open_sweep, summarised, sweep
 
@@ -106,3 +108,12 @@ def test_noise_drawn_anew_scatters_estimates_as_their_standard_errors_say(tmp_pa
     for name, value in truth.items():
         own = found.sel(coefficient=name)
         assert abs(float(own.estimate.mean()) - value) < 5.0 * float(own.standard_error.mean()) / np.sqrt(150)
+
+
+def test_answers_by_compiled_code_are_the_same(done, tmp_path):
+    by_c = plan(compiled=True)
+    assert by_c.problems[0].march is not None
+    again = pickle.loads(pickle.dumps(by_c))
+    assert farthest(done[1], sweep(again, tmp_path / "out")) <= 1e-9
+    with pytest.raises(InputError, match="derivatives that C has not"):
+        plan(compiled=True, method="newton")

@@ -1,0 +1,124 @@
+"""A problem on compiled C says what the same problem says by JAX, whatever stands beside it in a batch."""
+
+import dataclasses
+import shutil
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from rigs import body, chosen, coupled, driven, oscillator, stacked
+
+from jaxsub.effects import AbstractActuator, parameter_table
+from jaxsub.errors import InputError
+from jaxsub.estimate import Problem, gauss_newton, scattered
+from jaxsub.simulate import simulate, synthetic
+
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+SIGMA = 0.02
+
+
+def problem(vehicle, lengths=(40, 25), substeps=1, known_start=False, **options):
+    """The fit of a vehicle a few per cent off to runs of those lengths, some of whose samples are missing."""
+    driving = [driven(vehicle, 0.1 * np.arange(n), seed=i, **options) for i, n in enumerate(lengths)]
+    runs = stacked(vehicle, synthetic(vehicle, driving, seed=4), substeps)
+    kept = jnp.asarray(np.random.default_rng(6).uniform(size=runs.mask.shape) < 0.8) & runs.mask
+    runs = dataclasses.replace(runs, mask=kept, outputs=jnp.where(kept, runs.outputs, 0.0))
+    sigma = jnp.full(runs.outputs.shape[-1], SIGMA)
+    return Problem.of(vehicle, runs, sigma, known_start=known_start)
+
+
+FEW = ("quadratic-damping", "fluid-memory", "current", "sensor-scale")
+
+
+def laden(names=None):
+    """A body with effects, of those names or every one of the vocabulary that there is C for."""
+    vehicle = body()
+    for effect in chosen(vehicle):
+        there = not isinstance(effect, AbstractActuator) and effect.name != "sensor-delay"
+        if there and (names is None or effect.name in names):
+            vehicle = vehicle.with_effect(effect)
+    return vehicle
+
+
+CASES = {
+    "mechanism": lambda: problem(coupled(), substeps=2),
+    "known start": lambda: problem(coupled(), known_start=True),
+    "body": lambda: problem(laden(FEW), lengths=(6, 5), amplitude=0.02),
+    "every effect": lambda: problem(laden(), lengths=(6, 5), amplitude=0.02),
+}
+PARAMS = [pytest.param(case, marks=[pytest.mark.long] * (case == "every effect")) for case in CASES]
+
+
+@pytest.fixture(scope="module", params=PARAMS)
+def both(request):
+    """A problem, the same on C, and points about its start."""
+    made = CASES[request.param]()
+    y = made.coordinates() + 0.02 * jnp.asarray(np.random.default_rng(2).normal(size=(11, made.coordinates().size)))
+    return made, made.in_c(), y
+
+
+def close(found, expected):
+    for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-11 * float(jnp.max(jnp.abs(other))))
+
+
+def test_cost_and_expansion_are_those_of_jax(both):
+    made, fast, y = both
+    few = y[:3]
+    close(jax.jit(jax.vmap(fast.cost))(few), jax.jit(jax.vmap(made.cost))(few))
+    close(jax.jit(jax.vmap(fast.expand))(few), jax.jit(jax.vmap(made.expand))(few))
+
+
+@pytest.mark.parametrize("count", [1, 11])
+def test_a_member_says_the_same_whoever_is_beside_it(both, count):
+    """To the last digit but one: lanes are filled with members, or where those are few with their runs."""
+    _, fast, y = both
+    close(jax.jit(jax.vmap(fast.expand))(y[:count]), jax.lax.map(fast.expand, y[:count]))
+
+
+def test_batches_of_batches_and_recordings_of_their_own():
+    made = problem(coupled())
+    fast = made.in_c()
+    y = made.coordinates() + 0.02 * jnp.asarray(np.random.default_rng(2).normal(size=(2, 3, made.coordinates().size)))
+    outputs = made.runs.outputs + jnp.asarray(np.random.default_rng(3).normal(size=(3, *made.runs.outputs.shape)))
+
+    def cost(of, y, outputs):
+        return dataclasses.replace(of, runs=dataclasses.replace(of.runs, outputs=outputs)).cost(y)
+
+    for over_outputs in (None, 0):
+        batched = lambda of, axis=over_outputs: jax.vmap(jax.vmap(lambda y, z: cost(of, y, z), (0, axis)), (0, None))(
+            y, outputs[0] if axis is None else outputs
+        )
+        close(batched(fast), batched(made))
+
+
+def test_a_run_that_ended_may_go_anywhere_afterwards():
+    """Drag that drives blows up from a start that is fast enough, where the shorter run is made up to the longer."""
+    drag = next(e for e in chosen(oscillator()) if e.name == "quadratic-damping")
+    vehicle = oscillator().with_effect(drag)
+    made = problem(vehicle.with_values({row.name: jnp.asarray(0.5) for row in parameter_table(drag).values()}), (60, 4))
+    made = dataclasses.replace(made, guess=made.guess.at[1].set(jnp.array([4.0, 0.0])))
+    fast, y = made.in_c(), made.coordinates()
+    longer = dataclasses.replace(made.runs, live=jnp.ones_like(made.runs.live))
+    assert not np.isfinite(simulate(made.split(y)[0], longer, made.guess)).all()
+    close(fast.expand(y), made.expand(y))
+
+
+def test_searches_end_where_they_end_by_jax():
+    made = problem(coupled())
+    starts = scattered(made, 0.3, 12, 0)
+    found, expected = (gauss_newton().run(of, starts) for of in (made.in_c(), made))
+    np.testing.assert_array_equal(found.evaluations, expected.evaluations)
+    np.testing.assert_allclose(found.y, expected.y, rtol=1e-7, atol=1e-7)
+
+
+def test_what_has_no_c_is_refused():
+    uneven = problem(oscillator())
+    uneven = dataclasses.replace(uneven, runs=dataclasses.replace(uneven.runs, steps=jnp.array([0.1, 0.2])))
+    with pytest.raises(InputError, match="unevenly"):
+        uneven.in_c()
+    effects = {effect.name: effect for effect in chosen(body())}
+    for name, why in {"actuator-lag": "actuators: answer to what is estimated", "sensor-delay": "more than"}.items():
+        with pytest.raises(InputError, match=why):
+            problem(body().with_effect(effects[name]), lengths=(8,), hold=2).in_c()
