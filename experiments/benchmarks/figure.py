@@ -36,7 +36,7 @@ def draw(found: Mapping[str, dict], path: Path) -> None:
     if "many_starts" in found:
         rows |= {
             f"fit from a start: {name}": found["many_starts"][name]["seconds_a_start"]
-            for name in ("jaxsub", "CasADi C, two processes")
+            for name in ("jaxsub", "jaxsub in C", "CasADi C, two processes")
         }
     if rows:
         _bars(axes[1, 0], rows, "a member of a batch, a start of a sweep; two cores: seconds")

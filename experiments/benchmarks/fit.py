@@ -52,6 +52,7 @@ def run(out: Path, quick: bool) -> dict:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         measure("jaxsub", lambda: (lambda: _ours(problem), {}), max(repeats, 3))
+        measure("jaxsub in C", lambda: _ours_in_c(problem), max(repeats, 3))
         measure("CasADi C, Gauss-Newton by hand", lambda: _prepared(SingleShooting(Model(case), folder), z))
         for stride in _STRIDES[:1] if quick else _STRIDES:
             shooting = lambda stride=stride: _prepared(MultipleShooting(Model(case), folder, stride), z)
@@ -67,7 +68,7 @@ def run(out: Path, quick: bool) -> dict:
     for row in found.values():
         if "cost" in row:
             row["above_best"] = row["cost"] - best
-    ours = found["jaxsub"]["s"]
+    ours, in_c = (found[name]["s"] for name in ("jaxsub", "jaxsub in C"))
     taken = {name: row.get("s") or row.get("more_than_s") or row["at_least_s"] for name, row in found.items()}
     return {
         "cores": cores,
@@ -76,6 +77,7 @@ def run(out: Path, quick: bool) -> dict:
         "samples": list(case.measured.shape[:2]),
         "fits": found,
         "times_ours": {name: seconds / ours for name, seconds in taken.items()},
+        "times_ours_in_C": {name: seconds / in_c for name, seconds in taken.items()},
         "dynax": "the package of that name in the registry (0.0.1) is another's, and empty: it has no module",
     }
 
@@ -83,6 +85,11 @@ def run(out: Path, quick: bool) -> dict:
 def _ours(problem: Problem) -> End:
     ended = jax.block_until_ready(gauss_newton().run(problem, problem.coordinates()[None]).one(0))
     return End(np.asarray(ended.y), float(ended.cost), int(ended.evaluations))
+
+
+def _ours_in_c(problem: Problem) -> tuple[Callable[[], End], dict]:
+    fast, seconds = once(problem.in_c)
+    return lambda: _ours(fast), {"made_s": seconds}
 
 
 def _prepared(peer: SingleShooting | MultipleShooting, z: np.ndarray) -> tuple[Callable[[], End], dict]:

@@ -1,10 +1,10 @@
-"""`python -m experiments.sweep_scaling --out DIR [--quick]`: the same sweep on one device, on two and on a cluster.
+"""`python -m experiments.sweep_scaling --out DIR [--quick]`: the same sweep on one device, on two, on a cluster and in C.
 
 Each engine does sweeps of growing size in a process of its own, once it has compiled: searches a second, and the slope
 of the logarithm of time over that of size. `agreement` compares the three stores of the largest sweep, and one of other
 chunks, number by number. `memory` asks XLA what a batch of searches takes, against their number and the samples, beside
 what the sweep bounds it by. On one CPU device searches go to all cores by threads; two devices share the same cores,
-and so do two workers: on two cores the three differ by their overheads alone.
+and so do two workers: on two cores the three differ by their overheads alone. `compiled` is one device and C.
 """
 
 import dataclasses
@@ -28,7 +28,7 @@ from jaxsub.sweep import open_sweep, sweep
 from .case import longer, plan
 from .figure import draw
 
-ENGINES = ("one_device", "two_devices", "two_workers")
+ENGINES = ("one_device", "two_devices", "two_workers", "compiled")
 _PARTS = (*ENGINES, "agreement", "memory", "figure")
 # searches in the chunks of a sweep that is split in another way
 _OTHER = 48
@@ -53,21 +53,22 @@ def part(name: str, out: Path, quick: bool) -> dict:
         with started as cluster:
             return timed(out / "stores" / name, quick, cluster.scheduler_address)
     if name in ENGINES:
-        return timed(out / "stores" / name, quick, None)
+        return timed(out / "stores" / name, quick, None, compiled=name == "compiled")
     return {"agreement": agreement, "memory": memory, "figure": draw}[name](out, quick)
 
 
-def timed(stores: Path, quick: bool, address: str | None) -> dict:
+def timed(stores: Path, quick: bool, address: str | None, *, compiled: bool = False) -> dict:
     """Seconds of sweeps of each size, compilation apart, whose stores are kept."""
     clock: Callable[[], float] = time.perf_counter
+    planned = lambda count: dataclasses.replace(plan(quick, count), compiled=compiled)
     with tempfile.TemporaryDirectory() as scratch:
         begin = clock()
         # two chunks, so that both devices or workers compile
-        sweep(plan(quick, 2 * sizes(quick)[0]), Path(scratch) / "first", cluster=address)
+        sweep(planned(2 * sizes(quick)[0]), Path(scratch) / "first", cluster=address)
         first = clock() - begin
     seconds = []
     for size in sizes(quick):
-        made, begin = plan(quick, size), clock()
+        made, begin = planned(size), clock()
         sweep(made, stores / str(size), cluster=address)
         seconds.append(clock() - begin)
     return {

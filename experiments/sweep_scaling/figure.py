@@ -9,7 +9,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-_COLOURS = {"one_device": "#1f4e79", "two_devices": "#b5482a", "two_workers": "#e0a030"}
+_COLOURS = {"one_device": "#1f4e79", "two_devices": "#b5482a", "two_workers": "#e0a030", "compiled": "#5a8f3c"}
 
 
 def draw(out: Path, quick: bool) -> dict:

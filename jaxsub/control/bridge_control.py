@@ -1,9 +1,10 @@
 """A plant in python-control: the plant itself as a nonlinear system, its linear form as a state space."""
 
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
+import jax
 import numpy as np
 
 from ..errors import InputError
@@ -19,17 +20,20 @@ def control_system(plant: Plant, name: str | None = None) -> Any:
     **Raises** `InputError` where python-control is not installed.
     """
     control = _control()
-    step, output = (eqx.filter_jit(function) for function in (plant.step, plant.output))
+    # taken apart once: to do so at each call takes longer than the step
+    numbers, rest = eqx.partition(plant, eqx.is_array)
 
-    def called(function: Any) -> Any:
+    def called(method: Callable) -> Callable:
+        run = jax.jit(lambda numbers, *arguments: method(eqx.combine(numbers, rest), *arguments))
+
         def at(t: float | int, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
-            return np.asarray(function(*(jnp.asarray(part, plant.constants.dtype) for part in (x, u, t))))
+            return np.asarray(run(numbers, *(np.asarray(part, plant.constants.dtype) for part in (x, u, t))))
 
         return at
 
     names = {"states": list(plant.states), "inputs": list(plant.inputs), "outputs": list(plant.outputs)}
     system_name = _plain(name or plant.vehicle.layout.name)
-    return control.NonlinearIOSystem(called(step), called(output), dt=plant.dt, name=system_name, **names)
+    return control.NonlinearIOSystem(called(Plant.step), called(Plant.output), dt=plant.dt, name=system_name, **names)
 
 
 def state_space(linear: LinearPlant, name: str | None = None) -> Any:

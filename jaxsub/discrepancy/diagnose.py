@@ -32,6 +32,8 @@ from .whiteness import RANDOM, Memory, memory
 
 # that a next manoeuvre is to tell from what was named
 _RIVALS = 2
+# and how many a page lists: the rest are less likely still
+_SHOWN = 4
 
 
 def diagnose(
@@ -187,7 +189,7 @@ def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVe
 def _physics(named: Named, improved: Fit) -> Physics:
     """An accepted effect with its numbers from the final fit."""
     effect = next((e for e in improved.vehicle.effects if e.label == named.effect.label), named.effect)
-    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals]
+    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals[:_SHOWN]]
     return Physics(
         effect.name,
         effect.label,

@@ -24,6 +24,9 @@ _POSSIBLE = 0.02
 _TRIES = 3
 # how far off a candidate's χ² may be, over the root of what coefficients leave of it, and at most; twins refitted
 _OFF, _FAR_OFF, _TWINS = 0.03, 0.3, 2
+# and between effects that act in the same place: where a motion is no larger than its noise, a picture along it gives
+# the square of a rate too much and its cube too little
+_SAME_PLACE = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
@@ -153,7 +156,9 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     # what coefficients absorb of an effect, they absorb of the picture's errors too, but not as exactly
     off = min(_FAR_OFF, _OFF / np.sqrt(max(selector.kept[index], 1e-12)))
     near = [j for n, j in best.items() if n != own and np.isfinite(log[j])]
-    near = [j for j in near if scan.statistic[j] > (1.0 - off) * scan.statistic[index]]
+    place = scan.effects[index].where
+    far = lambda j: _SAME_PLACE if scan.effects[j].where == place else off
+    near = [j for j in near if scan.statistic[j] > (1.0 - far(j)) * scan.statistic[index]]
     twins = sorted(near, key=lambda j: -log[j])[:_TWINS]
     return Named(index, scan.effects[index], by_name[own], sorted(rivals, key=lambda rival: -rival[1]), twins)
 

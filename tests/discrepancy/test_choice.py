@@ -1,5 +1,7 @@
 """What is taken first, what stands beside its twins, and what is said of those that a fit was asked of."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from diagnosis_cases import recorded, wrong
@@ -7,7 +9,8 @@ from diagnosis_cases import recorded, wrong
 from experiments.next_manoeuvre.cases import case
 from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.model import told
-from jaxsub.discrepancy.name import Named, refitted
+from jaxsub.discrepancy.name import Named, named_on, refitted
+from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.trial import Tries, alone
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
@@ -48,6 +51,24 @@ def test_what_is_there_is_told_and_what_is_not_is_not():
     assert told(view, [scale])
     assert not told(view, [asymmetry])
     assert not told(view, [scale, asymmetry])
+
+
+class Scanned(Selector):
+    """What `named_on` asks of a selector, of candidates whose χ² are given."""
+
+    def __init__(self, statistics, **effects):
+        self.candidates, self.kept = list(effects.values()), np.ones(len(effects))
+        statistic = np.array(statistics)
+        self.scan = lambda others: SimpleNamespace(effects=self.candidates, statistic=statistic, value=0.5 * statistic)
+        self.stand_in = lambda others, index: np.ones(len(effects), bool)
+
+
+def test_what_acts_in_the_same_place_is_fitted_although_a_picture_finds_it_far_worse():
+    """Claim: of two thirds of the χ² cubic damping in the same equation is a twin, in another it is none."""
+    damping = {"named": QuadraticDamping("x", -0.5), "same": CubicDamping("x", -0.5), "other": CubicDamping("y", -0.5)}
+    found = named_on(Scanned([600.0, 400.0, 400.0], **damping), [], 0)
+    assert found.twins == [1]
+    assert named_on(Scanned([600.0, 200.0, 590.0], **damping), [], 0).twins == [2]
 
 
 class Fitted(Tries):
