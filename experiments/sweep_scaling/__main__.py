@@ -1,4 +1,4 @@
-"""`python -m experiments.sweep_scaling --out DIR [--quick]`: the same sweep on one device, on two, on a cluster and in C.
+"""`python -m experiments.sweep_scaling --out DIR [--quick]`: one sweep on one device, two, a cluster and in C.
 
 Each engine does sweeps of growing size in a process of its own, once it has compiled: searches a second, and the slope
 of the logarithm of time over that of size. `agreement` compares the three stores of the largest sweep, and one of other

@@ -58,7 +58,7 @@ def diagnose(
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
         raise InputError(vehicle.layout.name, "the model does not run from its starting values", remedy)
     progress("following the recordings")
-    found = examine(look(start), vocabulary, progress)
+    found = examine(look(start, file=vehicle), vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
     progress("free runs through what the fit did not see")

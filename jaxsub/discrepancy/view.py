@@ -1,6 +1,7 @@
 """A fitted model as a filter of it follows its recordings: what every question about left-out physics is asked of."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -34,6 +35,8 @@ _restricted = eqx.filter_jit(restricted)
 _STEPS = 2
 # disturbance and numbers are sought in turns until the log likelihood changes by less
 _TURNS, _SETTLED = 8, 0.5
+# rms over sigma of a channel, above which a fit is not trusted to have ended near the truth
+_MUCH = 2.0
 _LEAST_WHITE = 1e-5
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
@@ -101,17 +104,30 @@ class View:
     prior: Float[Array, "p1 p1"]
 
 
-def look(fit: Fit, disturbance: Disturbance | None = None) -> View:
+def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle | None = None) -> View:
     """The view of a fit, its free numbers moved to where innovations are least.
 
     The search for the disturbance starts from what the residuals ask, or from the given one where that is better: after
-    a fit that explains more, it is far too large, and numbers that are moved under it are lost.
+    a fit that explains more, it is far too large, and numbers that are moved under it are lost. Numbers are moved from
+    those of the fit and, where that leaves much, from those of the `file` too: a fit that has to do without the physics
+    may end where nothing leads back.
     """
     led = _Led(fit, fit.problem)
     system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     starts = [guess] if disturbance is None else [guess, disturbance]
-    at = min((led.at(fit.vehicle, start) for start in starts), key=lambda at: at.cost)
+    much = file is not None and max(fit.rms.values()) > _MUCH
+    found = [_settled(led, vehicle, starts) for vehicle in (fit.vehicle, *([file] if much else []))]
+    at = min(found, key=lambda at: at.cost if np.isfinite(at.cost) else np.inf)
+    path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
+    gram, _ = products(at.disturbance, at.followed.system, at.base, at.prior)
+    covariance = np.linalg.inv(np.asarray(gram)[1:, 1:]) / np.outer(at.length, at.length)
+    return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
+
+
+def _settled(led: "_Led", vehicle: AbstractVehicle, starts: Sequence[Disturbance]) -> "_At":
+    """The disturbance and the numbers, sought in turns from the better of `starts`."""
+    at = min((led.at(vehicle, start) for start in starts), key=lambda at: at.cost)
     before = np.inf
     for steps in (FROM_AFAR, *[FROM_NEAR] * (_TURNS - 1)):
         found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance, steps)
@@ -120,10 +136,7 @@ def look(fit: Fit, disturbance: Disturbance | None = None) -> View:
         if abs(before - cost) < _SETTLED:
             break
         before = cost
-    path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
-    gram, _ = products(at.disturbance, at.followed.system, at.base, at.prior)
-    covariance = np.linalg.inv(np.asarray(gram)[1:, 1:]) / np.outer(at.length, at.length)
-    return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
+    return at
 
 
 def _white(fit: Fit) -> Array:

@@ -35,15 +35,20 @@ def foreign(source: str, names: Sequence[str]) -> dict[str, str]:
 
 
 def _key(source: str) -> str:
-    where = (platform.machine(), platform.node(), jax.__version__, *_FLAGS)
+    where = (platform.machine(), platform.node(), jax.__version__, _compiler(), *_FLAGS)
     return hashlib.sha256("\n".join((source, *where)).encode()).hexdigest()[:20]
+
+
+def _compiler() -> str:
+    return os.environ.get("CC", "cc")
 
 
 @functools.cache
 def _register(source: str, key: str, names: tuple[str, ...]) -> None:
     kept = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
     with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(kept or temporary)
+        # a cache may be in a store that is no folder, such as gs://
+        folder = Path(kept if kept and "://" not in kept else temporary)
         library = folder / f"jaxsub-{key}.so"
         if not library.exists():
             folder.mkdir(parents=True, exist_ok=True)
@@ -56,7 +61,7 @@ def _register(source: str, key: str, names: tuple[str, ...]) -> None:
 
 
 def _compile(source: str, library: Path, folder: Path) -> None:
-    compiler = os.environ.get("CC", "cc")
+    compiler = _compiler()
     if shutil.which(compiler) is None:
         raise InputError(compiler, "no C compiler of this name", "install one, or name it in $CC")
     written, made = folder / "source.c", folder / library.name

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from diagnosis_cases import recorded, wrong
@@ -17,7 +18,9 @@ from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.mechanisms import CoulombFriction
 from jaxsub.effects.sensors import SensorScale
-from jaxsub.estimate import fit
+from jaxsub.estimate import Problem, evaluate, fit
+from jaxsub.results import RESULTS
+from jaxsub.vehicle.catalogue import dsrv
 
 
 @pytest.mark.long
@@ -41,6 +44,20 @@ def test_probabilities_of_twins_are_those_of_their_fits_and_others_keep_theirs()
         {"cubic-damping": 0.2, "coulomb-friction": 0.2}
     )
     assert refitted(named, [(cubic, -1.0)]) == named
+
+
+def test_a_fit_that_went_astray_is_looked_at_from_the_file_too():
+    """Claim: from numbers that a fit might have run away to, with their signs turned, the file's lead back."""
+    runs = batch(wrong(), recorded(None, 2)[:2])
+    values = wrong().values()
+    turned = {row.name: -20.0 * values[row.name] for row in wrong().layout.free if row.name in ("Z_q", "M_w")}
+    sigma = jnp.array([output.sigma for output in wrong().layout.outputs])
+    start, ended = Problem.of(wrong(), runs, sigma).guess, {"cost": jnp.asarray(0.0), "steps": jnp.asarray(0)}
+    gone = evaluate(wrong().with_values(turned), runs, start, sigma, **ended, result=RESULTS.successful)
+    assert max(gone.rms.values()) > 2.0
+    found = look(gone, file=wrong()).vehicle.values()
+    for row in wrong().layout.free:
+        assert float(found[row.name]) == pytest.approx(float(dsrv().values()[row.name]), rel=0.2), row.name
 
 
 def test_what_is_there_is_told_and_what_is_not_is_not():
