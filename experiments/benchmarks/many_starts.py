@@ -23,7 +23,7 @@ from .timing import once, pin
 
 COUNT, SPREAD, SEED = 1000, 0.5, 5
 # s that one side may take; where it would take longer it does as many starts as fit, and the table says how many
-_LIMIT, _TRIAL = 240.0, 32
+_LIMIT, _TRIAL = 90.0, 32
 _MARGIN = 0.1
 _peer: list[SingleShooting] = []
 
