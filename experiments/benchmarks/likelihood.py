@@ -56,7 +56,8 @@ def single(out: Path, quick: bool) -> dict:
     scalar, slope = (f(model) for f in (casadi_model.cost, lambda m: casadi_model.with_gradient(casadi_model.cost(m))))
     columns = casadi_model.sensitivities(model)
     with tempfile.TemporaryDirectory() as folder:
-        generated, compile_s = {}, {"jaxsub in C": made_s}
+        generated: dict = {}
+        compile_s: dict = {"jaxsub in C": made_s}
         for name, of in {"likelihood": scalar, "gradient": slope, "columns": columns}.items():
             generated[name], compile_s[f"CasADi C {name}"] = casadi_model.in_c(of, Path(folder))
         run = (z[: len(case.names)], case.guess[0], case.fins[0, :-1].T)

@@ -116,8 +116,8 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     starts = [guess] if disturbance is None else [guess, disturbance]
-    much = file is not None and max(fit.rms.values()) > _MUCH
-    found = [_settled(led, vehicle, starts) for vehicle in (fit.vehicle, *([file] if much else []))]
+    also = [file] if file is not None and max(fit.rms.values()) > _MUCH else []
+    found = [_settled(led, vehicle, starts) for vehicle in (fit.vehicle, *also)]
     at = min(found, key=lambda at: at.cost if np.isfinite(at.cost) else np.inf)
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     gram, _ = products(at.disturbance, at.followed.system, at.base, at.prior)
