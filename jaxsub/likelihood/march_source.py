@@ -26,44 +26,16 @@ def march_c(model: Sampled, numbers: np.ndarray, moved: np.ndarray, by: np.ndarr
     - `model`: one of the models; `numbers`: (a,) all of its numbers, the step's weights last.
     - `moved`: (t,) which of them differ from model to model. `by`: (t, p) which coordinates each depends on.
     """
-    layout = model.vehicle.layout
-    states, channels = len(layout.equations) + len(layout.positions), runs.outputs.shape[-1]
-    signals = 3 * (runs.signals.shape[-1] + 1)
-    seen = 1 + runs.signals.shape[-1] + 2 * channels
-    th, x = casadi.SX.sym("th", len(moved)), casadi.SX.sym("x", states)
-    u, z = casadi.SX.sym("u", signals), casadi.SX.sym("z", seen)
-    full = casadi.SX(casadi.DM(numbers))
-    for place, number in enumerate(moved):
-        full[int(number)] = th[place]
-    step, shown = _taken_apart(model, len(numbers), states, signals, seen, channels)
-    D = casadi.SX.sym("D", casadi.Sparsity.triplet(*by.shape, *(list(map(int, where)) for where in np.nonzero(by))))
-    after = casadi.densify(step(full, x, u))
-    weight = z[seen - channels :]
-    error = casadi.if_else(weight != 0, weight * shown(full, x, z), 0)
-    A, B = casadi.jacobian(after, x), casadi.jacobian(after, th) @ D
-    slope, direct = casadi.jacobian(error, x), casadi.jacobian(error, th) @ D
-    rows = lambda *matrices: [matrix.T for matrix in matrices]
-    functions = [
-        casadi.Function("step", [th, x, u], [after]),
-        casadi.Function("slopes", [th, x, u, D], [after, *rows(A, B)], {"cse": True}),
-        casadi.Function("shown", [th, x, z], [error]),
-        casadi.Function("shown_slopes", [th, x, z, D], [error, *rows(slope, direct)], {"cse": True}),
-    ]
+    functions, slopes, derivatives = _functions(model, numbers, moved, by, runs)
     equations = model.inverse.shape[0]
-    before = len(numbers) - _WEIGHTS * equations**2
-    others = np.flatnonzero(moved < before)
-    # C counts the weights downwards from -1
-    from_th = np.where(moved < before, np.cumsum(moved < before) - 1, before - 1 - moved)
-    order = np.cumsum(by[others]).reshape(by[others].shape) - 1
-    at, coordinate = (np.array(list(where), int) for where in D.sparsity().get_triplet())
-    weights = -1 - ((moved[at] - before) * by.shape[1] + coordinate)
-    from_D = np.array(
-        [order[from_th[t], j] if moved[t] < before else w for t, j, w in zip(at, coordinate, weights, strict=True)]
-    )
-    sizes = {"S": states, "N": equations, "P": by.shape[1], "C": channels, "U": signals, "Q": seen}
-    sizes |= {"TH": len(moved), "TO": len(others), "ND": D.nnz(), "NDO": int(by[others].sum()), "START": int(start)}
-    places = {"TH_FROM": from_th, "D_FROM": from_D}
-    for name, matrix in {"A": A, "B": B, "C": slope, "X": direct}.items():
+    sizes = {"N": equations, "P": by.shape[1], "TH": len(moved), "ND": derivatives.nnz(), "START": int(start)}
+    sizes |= {"S": functions[0].nnz_out(0), "U": functions[0].nnz_in(2)}
+    sizes |= {"C": functions[2].nnz_out(0), "Q": functions[2].nnz_in(2)}
+    weights = moved >= len(numbers) - _WEIGHTS * equations**2
+    places = _sources(moved - (len(numbers) - _WEIGHTS * equations**2), weights, by, derivatives)
+    sizes |= {"TO": int(np.sum(~weights)), "NDO": int(by[~weights].sum())}
+    for name, matrix in slopes.items():
+        # by rows, as C goes through them
         pattern = matrix.T.sparsity()
         sizes[f"N{name}"] = pattern.nnz()
         places |= {f"{name}_BEGIN": pattern.colind(), f"{name}_PLACE": pattern.row()}
@@ -76,6 +48,50 @@ def march_c(model: Sampled, numbers: np.ndarray, moved: np.ndarray, by: np.ndarr
             _LOOP.read_text(encoding="utf-8"),
         ]
     )
+
+
+def _functions(
+    model: Sampled, numbers: np.ndarray, moved: np.ndarray, by: np.ndarray, runs: Runs
+) -> tuple[list["casadi.Function"], dict[str, "casadi.SX"], "casadi.Sparsity"]:
+    """The model's functions as C has them, the Jacobians among their results, and where the numbers' slopes are."""
+    layout, channels = model.vehicle.layout, runs.outputs.shape[-1]
+    states, inputs = len(layout.equations) + len(layout.positions), runs.signals.shape[-1]
+    sizes = {"th": len(moved), "x": states, "u": 3 * (inputs + 1), "z": 1 + inputs + 2 * channels}
+    th, x, u, z = (casadi.SX.sym(name, size) for name, size in sizes.items())
+    full = casadi.SX(casadi.DM(numbers))
+    for place, number in enumerate(moved):
+        full[int(number)] = th[place]
+    step, shown = _taken_apart(model, len(numbers), sizes["x"], sizes["u"], sizes["z"], channels)
+    pattern = casadi.Sparsity.triplet(*by.shape, *(list(map(int, where)) for where in np.nonzero(by)))
+    D = casadi.SX.sym("D", pattern)
+    after = casadi.densify(step(full, x, u))
+    weight = z[sizes["z"] - channels :]
+    error = casadi.if_else(weight != 0, weight * shown(full, x, z), 0)
+    slopes = {"A": casadi.jacobian(after, x), "B": casadi.jacobian(after, th) @ D}
+    slopes |= {"C": casadi.jacobian(error, x), "X": casadi.jacobian(error, th) @ D}
+    shared = {"cse": True}
+    functions = [
+        casadi.Function("step", [th, x, u], [after]),
+        casadi.Function("slopes", [th, x, u, D], [after, slopes["A"].T, slopes["B"].T], shared),
+        casadi.Function("shown", [th, x, z], [error]),
+        casadi.Function("shown_slopes", [th, x, z, D], [error, slopes["C"].T, slopes["X"].T], shared),
+    ]
+    return functions, slopes, pattern
+
+
+def _sources(index: np.ndarray, weights: np.ndarray, by: np.ndarray, pattern: "casadi.Sparsity") -> dict[str, Iterable]:
+    """Where C finds each number, and each slope: among those it is given, or counted downwards from -1, among weights.
+
+    `index`: (t,) of each number among the step's weights, where it is one of `weights`.
+    """
+    given = by[~weights]
+    order, rank = np.cumsum(given).reshape(given.shape) - 1, np.cumsum(~weights) - 1
+    number, coordinate = (np.array(list(where), int) for where in pattern.get_triplet())
+    slopes = [
+        -1 - (index[n] * by.shape[1] + j) if weights[n] else order[rank[n], j]
+        for n, j in zip(number, coordinate, strict=True)
+    ]
+    return {"TH_FROM": np.where(weights, -1 - index, rank), "D_FROM": slopes}
 
 
 def _taken_apart(
