@@ -7,6 +7,8 @@ import jaxtyping
 import pytest
 
 jax.config.update("jax_enable_x64", True)
+# Most of the suite's time is compilation of programs that run once.
+jax.config.update("jax_disable_most_optimizations", True)
 # Before any test imports jaxsub, since only modules imported later are checked.
 jaxtyping.install_import_hook("jaxsub", "typechecking.checked")
 

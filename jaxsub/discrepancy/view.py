@@ -37,6 +37,8 @@ _STEPS = 2
 _TURNS, _SETTLED = 8, 0.5
 # rms over sigma of a channel, above which a fit is not trusted to have ended near the truth
 _MUCH = 2.0
+# of the forces that would explain all that is left: too small to lead a path, and large enough to grow from
+_QUIET = 1e-2
 _LEAST_WHITE = 1e-5
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
@@ -108,16 +110,20 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     """The view of a fit, its free numbers moved to where innovations are least.
 
     The search for the disturbance starts from what the residuals ask, or from the given one where that is better: after
-    a fit that explains more, it is far too large, and numbers that are moved under it are lost. Numbers are moved from
-    those of the fit and, where that leaves much, from those of the `file` too: a fit that has to do without the physics
-    may end where nothing leads back.
+    a fit that explains more, it is far too large, and numbers that are moved under it are lost.
+
+    Where a fit leaves much, the best of several searches is taken. Numbers are moved from those of the fit and from
+    those of the `file`: a fit that has to do without the physics may end where nothing leads back. And what is left is
+    put down to forces at first, or to sensors: forces that follow a sensor which is wrong make the right ones wrong.
     """
     led = _Led(fit, fit.problem)
     system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
-    starts = [guess] if disturbance is None else [guess, disturbance]
-    also = [file] if file is not None and max(fit.rms.values()) > _MUCH else []
-    found = [_settled(led, vehicle, starts) for vehicle in (fit.vehicle, *also)]
+    vehicles, starts = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]]
+    if max(fit.rms.values()) > _MUCH:
+        vehicles += [file] if file is not None else []
+        starts.append([_in_sensors(guess, fit)])
+    found = [_settled(led, vehicle, some) for vehicle in vehicles for some in starts]
     at = min(found, key=lambda at: at.cost if np.isfinite(at.cost) else np.inf)
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     gram, _ = products(at.disturbance, at.followed.system, at.base, at.prior)
@@ -137,6 +143,12 @@ def _settled(led: "_Led", vehicle: AbstractVehicle, starts: Sequence[Disturbance
             break
         before = cost
     return at
+
+
+def _in_sensors(guess: Disturbance, fit: Fit) -> Disturbance:
+    """What a fit leaves, put down to the noise of each channel."""
+    rms = jnp.asarray([fit.rms[channel] for channel in fit.vehicle.layout.channels])
+    return Disturbance(_QUIET * guess.force, guess.time, jnp.maximum(guess.noise, rms))
 
 
 def _white(fit: Fit) -> Array:

@@ -12,9 +12,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 _TERMS, _DOUBLINGS = 10, 12
+Phi = tuple[Array, Array, Array, Array]
 
 
-def phi_functions(A: Float[Array, "n n"]) -> tuple[Array, Array, Array, Array]:
+def phi_functions(A: Float[Array, "n n"]) -> Phi:
     r"""$e^A$ and $\varphi_k(A) = \sum_j A^j/(j+k)!$ for k = 1, 2, 3, also where A is singular.
 
     Taylor series of $A/2^s$, then s doublings
@@ -24,18 +25,22 @@ def phi_functions(A: Float[Array, "n n"]) -> tuple[Array, Array, Array, Array]:
     """
     eye = jnp.eye(A.shape[0], dtype=A.dtype)
     small = A / 2**_DOUBLINGS
-    series = [eye, eye, eye / 2.0, eye / 6.0]
-    terms = list(series)
-    for j in range(1, _TERMS):
-        terms = [terms[k] @ small / (j + k) for k in range(4)]
-        series = [total + term for total, term in zip(series, terms, strict=True)]
 
-    def double(phi: tuple[Array, ...], _: None) -> tuple[tuple[Array, ...], None]:
-        e, p1, p2, p3 = phi
-        return (e @ e, (e @ p1 + p1) / 2.0, (e @ p2 + p1 + p2) / 4.0, (e @ p3 + p1 / 2.0 + p2 + p3) / 8.0), None
+    def add(carry: tuple[Array, Phi], j: Array) -> tuple[tuple[Array, Phi], None]:
+        power, phi = carry
+        power = power @ small / j
+        shares = (1.0, 1.0 / (j + 1.0), 1.0 / ((j + 1.0) * (j + 2.0)), 1.0 / ((j + 1.0) * (j + 2.0) * (j + 3.0)))
+        return (power, tuple(total + share * power for total, share in zip(phi, shares, strict=True))), None
 
-    e, p1, p2, p3 = jax.lax.scan(double, tuple(series), None, length=_DOUBLINGS)[0]
-    return e, p1, p2, p3
+    first = (eye, eye, eye / 2.0, eye / 6.0)
+    (_, phi), _ = jax.lax.scan(add, (eye, first), jnp.arange(1, _TERMS, dtype=A.dtype))
+    return jax.lax.scan(lambda phi, _: (doubled(phi), None), phi, None, length=_DOUBLINGS)[0]
+
+
+def doubled(phi: Phi) -> Phi:
+    """The functions of $2A$ from those of A."""
+    e, p1, p2, p3 = phi
+    return e @ e, (e @ p1 + p1) / 2.0, (e @ p2 + p1 + p2) / 4.0, (e @ p3 + p1 / 2.0 + p2 + p3) / 8.0
 
 
 class StepTable(eqx.Module):
@@ -64,8 +69,9 @@ def step_table(L: Float[Array, "n n"], h: Float[Array, " s"]) -> StepTable:
     """The weights for the linear part `L` (1/s) and step lengths `h` (s)."""
 
     def weights(length: Array) -> StepTable:
-        half, p1_half, _, _ = phi_functions(0.5 * length * L)
-        full, p1, p2, p3 = phi_functions(length * L)
+        of_half = phi_functions(0.5 * length * L)
+        half, p1_half, _, _ = of_half
+        full, p1, p2, p3 = doubled(of_half)
         first, middle, last = p1 - 3.0 * p2 + 4.0 * p3, 2.0 * p2 - 4.0 * p3, 4.0 * p3 - p2
         return StepTable(length, full, half, 0.5 * length * p1_half, length * first, length * middle, length * last)
 

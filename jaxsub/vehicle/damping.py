@@ -1,11 +1,9 @@
 """Linear hull damping."""
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-_ROWS = dict(zip("XYZKMN", range(6), strict=True))
-_COLUMNS = dict(zip("uvwpqr", range(6), strict=True))
+from .inertia import place, sparse
 
 
 class Damping(eqx.Module):
@@ -22,7 +20,6 @@ class Damping(eqx.Module):
 
     def matrix(self, mass: Array, cruise: Array) -> Float[Array, "6 6"]:
         """The 6 × 6 matrix for a body of `mass` kg at the operating speed `cruise` m/s."""
-        matrix = jnp.zeros((6, 6), jnp.result_type(float)).at[1, 5].add(-mass * cruise).at[2, 4].add(mass * cruise)
-        for name, value in self.coefficients.items():
-            matrix = matrix.at[_ROWS[name[0]], _COLUMNS[name[2]]].add(value)
-        return matrix
+        around = mass * cruise
+        own = [(*place(name), value) for name, value in self.coefficients.items()]
+        return sparse([(1, 5, -around), (2, 4, around), *own])

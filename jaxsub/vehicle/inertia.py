@@ -1,5 +1,7 @@
 """Rigid-body and added inertia."""
 
+from collections.abc import Sequence
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -7,8 +9,6 @@ from jaxtyping import Array, Float
 
 from ..effects import EQUATIONS, VELOCITIES
 
-_ROWS = dict(zip("XYZKMN", range(6), strict=True))
-_COLUMNS = dict(zip("uvwpqr", range(6), strict=True))
 RIGID = ("mass", "mass", "mass", "I_x", "I_y", "I_z")
 
 
@@ -29,18 +29,38 @@ class Inertia(eqx.Module):
 
     def matrix(self) -> Float[Array, "6 6"]:
         """The 6 × 6 inertia matrix."""
-        matrix = jnp.diag(jnp.stack([self.rigid[name] for name in RIGID]))
+        rigid = jnp.diag(jnp.stack([self.rigid[name] for name in RIGID]))
+        entries = []
         for name, value in self.added.items():
-            row, column = _ROWS[name[0]], _COLUMNS[name[2]]
-            matrix = matrix.at[row, column].add(-value)
+            row, column = place(name)
+            entries.append((row, column, value))
             if row != column and twin(name) not in self.added:
-                matrix = matrix.at[column, row].add(-value)
-        return matrix
+                entries.append((column, row, value))
+        return rigid - sparse(entries)
+
+
+def place(name: str) -> tuple[int, int]:
+    """Row and column of the coefficient `name`, such as `Y_rdot`, in a 6 × 6 matrix."""
+    return "XYZKMN".index(name[0]), "uvwpqr".index(name[2])
+
+
+def sparse(entries: Sequence[tuple[int, int, Array]]) -> Float[Array, "6 6"]:
+    """The 6 × 6 matrix with each value of `entries` added at its row and column.
+
+    One contraction with a constant: a scatter for each is dozens of operations to compile in every use of the model.
+    """
+    if not entries:
+        return jnp.zeros((6, 6), jnp.result_type(float))
+    basis = np.zeros((len(entries), 6, 6))
+    for ones, (row, column, _) in zip(basis, entries, strict=True):
+        ones[row, column] = 1.0
+    values = jnp.stack([value for _, _, value in entries])
+    return jnp.tensordot(values, jnp.asarray(basis, values.dtype), 1)
 
 
 def twin(name: str) -> str:
     """The coefficient that potential flow makes equal: `Y_rdot` for `N_vdot`."""
-    row, column = _ROWS[name[0]], _COLUMNS[name[2]]
+    row, column = place(name)
     return f"{'XYZKMN'[column]}_{'uvwpqr'[row]}dot"
 
 
