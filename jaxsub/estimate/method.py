@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -94,10 +94,16 @@ def in_shares(program: Program[T], method: Any, problem: Problem, starts: Array,
     if len(devices) > 1:
         parts = [_over_devices(program, method, problem, y, z) for y, z in rounds]
     else:
-        own = lambda part: jax.block_until_ready(program(method, problem, part[0], part[1]))
-        with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
-            parts = list(threads.map(own, rounds))
+        parts = _over_cores(program, method, problem, list(rounds))
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:count], *parts)
+
+
+def _over_cores(program: Any, method: Any, problem: Problem, rounds: Sequence[tuple[Array, Any]]) -> list:
+    """A thread for each core. Compiled before they begin: threads that trace the same program at once can crash JAX."""
+    compiled = program.lower(method, problem, *rounds[0]).compile()
+    own = lambda part: jax.block_until_ready(compiled(method, problem, *part))
+    with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
+        return list(threads.map(own, rounds))
 
 
 @eqx.filter_jit
