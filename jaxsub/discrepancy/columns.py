@@ -127,11 +127,17 @@ def _respond(effect: AbstractActuator, times: Array, nodes: Array) -> Array:
     return jax.vmap(effect.respond)(times, nodes)
 
 
-def plausible(path: Trajectory, effect: AbstractEffect) -> bool:
-    """Whether a sensor's error is smaller than what the sensor shows: a larger one is no sensor error but a way out."""
+def plausible(view: View, effect: AbstractEffect) -> bool:
+    """Whether a sensor's error is smaller than what the sensor shows: a larger one is no sensor error but a way out.
+
+    Of what it should show and what was measured, whichever is more: on a long arm a log feels mostly the turning.
+    """
     if not isinstance(effect, AbstractSensor):
         return True
-    return float(np.ptp(sensor_change(path, effect))) <= float(np.ptp(path.true[effect.channel]))
+    column = view.vehicle.layout.channels.index(effect.channel)
+    measured = np.asarray(view.runs.outputs)[..., column][np.asarray(view.runs.mask)[..., column]]
+    shown = max(np.ptp(view.path.true[effect.channel]), np.ptp(measured)) if measured.size else 0.0
+    return bool(np.ptp(sensor_change(view.path, effect)) <= shown)
 
 
 def sensor_change(path: Trajectory, effect: AbstractSensor) -> np.ndarray:

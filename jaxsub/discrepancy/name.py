@@ -147,15 +147,19 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     weights /= np.sum(weights)
     by_name: dict[str, float] = {}
     best: dict[str, int] = {}
+    # the same effect elsewhere is no rival, but a twin may be
+    elsewhere: dict[str, int] = {}
+    own, label = selector.candidates[index].name, selector.candidates[index].label
     for i, (effect, weight) in enumerate(zip(selector.candidates, weights, strict=True)):
         by_name[effect.name] = by_name.get(effect.name, 0.0) + float(weight)
-        if weight > weights[best.setdefault(effect.name, i)]:
-            best[effect.name] = i
-    own = selector.candidates[index].name
+        foremost, key = (elsewhere, effect.label) if effect.name == own else (best, effect.name)
+        if log[i] > log[foremost.setdefault(key, i)]:
+            foremost[key] = i
     rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > _POSSIBLE]
+    forms = [*best.values(), *(i for other, i in elsewhere.items() if other != label)]
     # what coefficients absorb of an effect, they absorb of the picture's errors too, but not as exactly
     off = min(_FAR_OFF, _OFF / np.sqrt(max(selector.kept[index], 1e-12)))
-    near = [j for n, j in best.items() if n != own and np.isfinite(log[j])]
+    near = [j for j in forms if np.isfinite(log[j])]
     place = scan.effects[index].where
     far = lambda j: _SAME_PLACE if scan.effects[j].where == place else off
     near = [j for j in near if scan.statistic[j] > (1.0 - far(j)) * scan.statistic[index]]
@@ -174,7 +178,7 @@ def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Na
     found = [(effect, share * float(w)) for (effect, _), w in zip(values, weights, strict=True)]
     others = [pair for pair in named.rivals if pair[0].name not in names]
     others += [pair for pair in found if pair[0].name != named.effect.name and pair[1] > _POSSIBLE]
-    probability = next(p for effect, p in found if effect.name == named.effect.name)
+    probability = sum(p for effect, p in found if effect.name == named.effect.name)
     return dataclasses.replace(named, probability=probability, rivals=sorted(others, key=lambda pair: -pair[1]))
 
 

@@ -108,7 +108,7 @@ class Selector:
             effects.append(predicted)
             good = good and bool(self.usable[i]) and effect.label not in taken
             # worth a look only where it may be chosen
-            right.append(good and (statistic[i] < _LOOKED_AT or plausible(self.evidence.view.path, predicted)))
+            right.append(good and (statistic[i] < _LOOKED_AT or plausible(self.evidence.view, predicted)))
         fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))

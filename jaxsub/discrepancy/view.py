@@ -1,7 +1,7 @@
 """A fitted model as a filter of it follows its recordings: what every question about left-out physics is asked of."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -123,19 +123,27 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     if max(fit.rms.values()) > _MUCH:
         vehicles += [file] if file is not None else []
         starts.append([_in_sensors(guess, fit)])
-    found = [_settled(led, vehicle, some) for vehicle in vehicles for some in starts]
-    at = min(found, key=lambda at: at.cost if np.isfinite(at.cost) else np.inf)
+    first, rest = (FROM_AFAR, FROM_NEAR), [FROM_NEAR] * (_TURNS - 2)
+    at = _settled(led, _best(_settled(led, _begun(led, v, some), first) for v in vehicles for some in starts), rest)
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     gram, _ = products(at.disturbance, at.followed.system, at.base, at.prior)
     covariance = np.linalg.inv(np.asarray(gram)[1:, 1:]) / np.outer(at.length, at.length)
     return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
-def _settled(led: "_Led", vehicle: AbstractVehicle, starts: Sequence[Disturbance]) -> "_At":
-    """The disturbance and the numbers, sought in turns from the better of `starts`."""
-    at = min((led.at(vehicle, start) for start in starts), key=lambda at: at.cost)
-    before = np.inf
-    for steps in (FROM_AFAR, *[FROM_NEAR] * (_TURNS - 1)):
+def _best(found: Iterable["_At"]) -> "_At":
+    return min(found, key=lambda at: at.cost if np.isfinite(at.cost) else np.inf)
+
+
+def _begun(led: "_Led", vehicle: AbstractVehicle, starts: Sequence[Disturbance]) -> "_At":
+    """A vehicle led under the best of some disturbances."""
+    return _best(led.at(vehicle, start) for start in starts)
+
+
+def _settled(led: "_Led", at: "_At", turns: Sequence[int]) -> "_At":
+    """The disturbance and the numbers, sought in `turns` of so many steps each, until they stay."""
+    before = at.cost
+    for steps in turns:
         found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance, steps)
         at = led.descend(at.vehicle, found)
         cost = at.cost
