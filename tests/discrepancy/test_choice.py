@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 from diagnosis_cases import recorded, wrong
 
+from experiments.concealed_physics.generate import generate
+from experiments.concealed_physics.plan import cases
 from experiments.next_manoeuvre.cases import case
+from jaxsub.cli.session import load_runs
 from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.model import told
 from jaxsub.discrepancy.name import Named, named_on, refitted
@@ -20,6 +23,7 @@ from jaxsub.effects.mechanisms import CoulombFriction
 from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import Problem, evaluate, fit
 from jaxsub.results import RESULTS
+from jaxsub.vehicle import read_vehicle
 from jaxsub.vehicle.catalogue import dsrv
 
 
@@ -60,6 +64,18 @@ def test_a_fit_that_went_astray_is_looked_at_from_the_file_too():
         assert float(found[row.name]) == pytest.approx(float(dsrv().values()[row.name]), rel=0.2), row.name
 
 
+@pytest.mark.long
+def test_a_late_heading_does_not_lead_where_no_velocity_is_logged(tmp_path):
+    """Claim: a heading that is 3 s late is named, though forces that follow it would explain it too."""
+    late = cases("no_velocity", 3)[2]
+    assert late.concealed == ("nps/sensor-delay[psi]",)
+    assert generate(late, tmp_path)["reached"] == [pytest.approx(10.0, rel=1e-3)]
+    vehicle = read_vehicle(tmp_path / "vehicle.toml")
+    runs = load_runs(sorted(tmp_path.glob("run*.csv")), vehicle)
+    found, _ = diagnose(vehicle, runs[:-1], runs[-1:])
+    assert (found.verdict, [physics.label for physics in found.physics]) == ("named", ["sensor-delay[psi]"])
+
+
 def test_what_is_there_is_told_and_what_is_not_is_not():
     """Claim: beside a sensor's scale error that was concealed, an asymmetry that was not is not told from nothing."""
     scale, asymmetry = SensorScale("q", 0.02), HullAsymmetry("pitch", 0.1)
@@ -86,6 +102,14 @@ def test_what_acts_in_the_same_place_is_fitted_although_a_picture_finds_it_far_w
     found = named_on(Scanned([600.0, 400.0, 400.0], **damping), [], 0)
     assert found.twins == [1]
     assert named_on(Scanned([600.0, 200.0, 590.0], **damping), [], 0).twins == [2]
+
+
+def test_the_same_effect_elsewhere_is_fitted_and_is_no_rival():
+    """Claim: drag of nearly the same χ² in another equation is a twin and shares the name's probability."""
+    here, there, cubic = QuadraticDamping("x", -0.5), QuadraticDamping("y", -0.5), CubicDamping("y", -0.5)
+    found = named_on(Scanned([600.0, 595.0, 400.0], here=here, there=there, cubic=cubic), [], 0)
+    assert (found.twins, found.rivals, found.probability) == ([1], [], pytest.approx(1.0))
+    assert refitted(found, [(there, -10.0), (here, -11.0)]).probability == pytest.approx(1.0)
 
 
 class Fitted(Tries):
