@@ -27,13 +27,13 @@ def phi_functions(A: Float[Array, "n n"]) -> Phi:
     small = A / 2**_DOUBLINGS
 
     def add(carry: tuple[Array, Phi], j: Array) -> tuple[tuple[Array, Phi], None]:
-        power, phi = carry
-        power = power @ small / j
-        shares = (1.0, 1.0 / (j + 1.0), 1.0 / ((j + 1.0) * (j + 2.0)), 1.0 / ((j + 1.0) * (j + 2.0) * (j + 3.0)))
-        return (power, tuple(total + share * power for total, share in zip(phi, shares, strict=True))), None
+        power, (e, p1, p2, p3) = carry
+        term = power @ small / j
+        first, second = term / (j + 1.0), term / ((j + 1.0) * (j + 2.0))
+        return (term, (e + term, p1 + first, p2 + second, p3 + second / (j + 3.0))), None
 
-    first = (eye, eye, eye / 2.0, eye / 6.0)
-    (_, phi), _ = jax.lax.scan(add, (eye, first), jnp.arange(1, _TERMS, dtype=A.dtype))
+    constant = (eye, eye, eye / 2.0, eye / 6.0)
+    (_, phi), _ = jax.lax.scan(add, (eye, constant), jnp.arange(1, _TERMS, dtype=A.dtype))
     return jax.lax.scan(lambda phi, _: (doubled(phi), None), phi, None, length=_DOUBLINGS)[0]
 
 
