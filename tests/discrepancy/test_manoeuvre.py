@@ -76,7 +76,7 @@ def separation_by_differences(truth, rival, start, spread, run, sigma):
     return np.sum((padded - S @ change) ** 2)
 
 
-@pytest.mark.parametrize("body", [False, True], ids=["oscillator", "DSRV"])
+@pytest.mark.parametrize("body", [False, pytest.param(True, marks=pytest.mark.long)], ids=["oscillator", "DSRV"])
 def test_separation_is_that_of_central_differences_and_least_squares(body):
     models, column = (drags(dsrv(), "pitch", -2e4, -1e5), "delta_s") if body else (RIVALS, "f")
     like = recorded(models[0], column, prbs(SAMPLES, 9, 0.1 if body else 1.0, 1))

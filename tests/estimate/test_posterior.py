@@ -24,6 +24,7 @@ def moments(data, name):
     return draws.mean(), draws.std(), float(arviz.rhat(draws)), float(arviz.ess(draws))
 
 
+@pytest.mark.long
 def test_nearly_linear_case_has_the_standard_errors_of_gauss_and_newton():
     outputs = {"x": {"sigma": 0.01}, "x_rate": {"sigma": "estimate"}}
     vehicle = oscillator(outputs=outputs)
