@@ -47,46 +47,55 @@ static void scale(V *to, double by, int count) {
     for (int i = 0; i < count; i++) to[i] *= by;
 }
 
+/* The phi functions of twice the matrix from those of it, M one after the other, and their derivatives dM, as doubled in
+simulate/exponential.py. `room` is for 4 more of each. */
+static void doubled(V *M, V *dM, V *room, int p) {
+    static const double by[4][4] = {{0, 0, 0, 0}, {0, 1, 0, 0}, {0, 1, 1, 0}, {0, 0.5, 1, 1}}, half[4] = {1, 0.5, 0.25, 0.125};
+    const int all = NN * p;
+    V *next = room, *d_next = room + 4 * NN;
+    for (int k = 0; k < 4; k++) product(M, dM, M + k * NN, dM + k * all, next + k * NN, d_next + k * all, p);
+    for (int k = 1; k < 4; k++)
+        for (int j = 1; j < 4; j++)
+            if (by[k][j] != 0.0) {
+                add(next + k * NN, M + j * NN, by[k][j], NN);
+                add(d_next + k * all, dM + j * all, by[k][j], all);
+            }
+    for (int k = 0; k < 4; k++) {
+        scale(next + k * NN, half[k], NN);
+        scale(d_next + k * all, half[k], all);
+    }
+    memcpy(M, next, 4 * NN * sizeof(V));
+    memcpy(dM, d_next, 4 * all * sizeof(V));
+}
+
 /* The phi functions of linear times h, as phi_functions in simulate/exponential.py; M holds them one after the other,
-dM their derivatives. `room` is for 9 more of each. */
+dM their derivatives. `room` is for 7 more of each. */
 static void phi(const V *linear, const V *d_linear, double h, V *M, V *dM, V *room, int p) {
     const int all = NN * p;
-    V *small = room, *terms = room + NN, *next = room + 5 * NN, *d_room = room + 9 * NN;
-    V *d_small = d_room, *d_terms = d_room + all, *d_next = d_room + 5 * all;
+    V *small = room, *term = room + NN, *next = room + 2 * NN;
+    V *d_small = room + 3 * NN, *d_term = d_small + all, *d_next = d_term + all, *rest = d_next + all;
     double factorial = 1.0;
     for (int i = 0; i < NN; i++) small[i] = linear[i] * (h / (1 << DOUBLINGS));
     for (int i = 0; i < all; i++) d_small[i] = d_linear[i] * (h / (1 << DOUBLINGS));
     memset(dM, 0, 4 * all * sizeof(V));
-    memset(d_terms, 0, 4 * all * sizeof(V));
+    memset(d_term, 0, all * sizeof(V));
     for (int k = 0; k < 4; k++) {
         if (k > 1) factorial *= k;
-        for (int i = 0; i < NN; i++) terms[k * NN + i] = M[k * NN + i] = v_same(i % (N + 1) == 0 ? 1.0 / factorial : 0.0);
+        for (int i = 0; i < NN; i++) M[k * NN + i] = v_same(i % (N + 1) == 0 ? 1.0 / factorial : 0.0);
     }
-    for (int j = 1; j < TERMS; j++)
+    memcpy(term, M, NN * sizeof(V));
+    for (int j = 1; j < TERMS; j++) {
+        product(term, d_term, small, d_small, next, d_next, p);
+        for (int i = 0; i < NN; i++) term[i] = next[i] / (double)j;
+        for (int i = 0; i < all; i++) d_term[i] = d_next[i] / (double)j;
+        double share = 1.0;
         for (int k = 0; k < 4; k++) {
-            V *term = terms + k * NN, *d_term = d_terms + k * all;
-            product(term, d_term, small, d_small, next, d_next, p);
-            for (int i = 0; i < NN; i++) term[i] = next[i] / (double)(j + k);
-            for (int i = 0; i < all; i++) d_term[i] = d_next[i] / (double)(j + k);
-            add(M + k * NN, term, 1.0, NN);
-            add(dM + k * all, d_term, 1.0, all);
+            if (k > 0) share /= j + k;
+            add(M + k * NN, term, share, NN);
+            add(dM + k * all, d_term, share, all);
         }
-    for (int s = 0; s < DOUBLINGS; s++) {
-        for (int k = 0; k < 4; k++) product(M, dM, M + k * NN, dM + k * all, next + k * NN, d_next + k * all, p);
-        const double by[4][4] = {{0, 0, 0, 0}, {0, 1, 0, 0}, {0, 1, 1, 0}, {0, 0.5, 1, 1}}, half[4] = {1, 0.5, 0.25, 0.125};
-        for (int k = 1; k < 4; k++)
-            for (int j = 1; j < 4; j++)
-                if (by[k][j] != 0.0) {
-                    add(next + k * NN, M + j * NN, by[k][j], NN);
-                    add(d_next + k * all, dM + j * all, by[k][j], all);
-                }
-        for (int k = 0; k < 4; k++) {
-            scale(next + k * NN, half[k], NN);
-            scale(d_next + k * all, half[k], all);
-        }
-        memcpy(M, next, 4 * NN * sizeof(V));
-        memcpy(dM, d_next, 4 * all * sizeof(V));
     }
+    for (int s = 0; s < DOUBLINGS; s++) doubled(M, dM, rest, p);
 }
 
 /* weights of the scheme: full, half, stage, first, middle, last, as step_table */
@@ -108,7 +117,7 @@ static void tables(const V *linear, const V *d_linear, double h, V *T, V *dT, V 
     memcpy(dT + all, d_phis, all * sizeof(V));
     for (int i = 0; i < NN; i++) T[2 * NN + i] = phis[NN + i] * (0.5 * h);
     for (int i = 0; i < all; i++) dT[2 * all + i] = d_phis[all + i] * (0.5 * h);
-    phi(linear, d_linear, h, phis, d_phis, more, p);
+    doubled(phis, d_phis, more, p);
     weigh(phis, h, T, NN);
     weigh(d_phis, h, dT, all);
 }
@@ -164,7 +173,7 @@ static inline void multiply_two(V *gram, const V *columns, int a) {
 
 /* What a block works in; a size that may be none has one more. */
 typedef struct {
-    V weights[TABLES * NN], d_weights[TABLES * NN * P + 1], linear[NN], d_linear[NN * P + 1], phi[17 * NN * (1 + P)];
+    V weights[TABLES * NN], d_weights[TABLES * NN * P + 1], linear[NN], d_linear[NN * P + 1], phi[11 * NN * (1 + P)];
     V other[TO + 1], th[TH + 1], D[ND + 1];
     V x[S], next[S], u[U], seen[Q], error[C];
     V a[NA + 1], b[NB + 1], c[NC + 1], direct[NX + 1];

@@ -206,7 +206,7 @@ def test_damped_newton_is_quadratic_at_the_end():
 def test_damped_newton_of_a_vehicle_refuses_a_trial_without_value(drag):
     cost, gradient, hessian = drag
     walled = lambda y, _: jnp.where(y[0] > 2.2, jnp.nan, cost(y))
-    found = minimise(walled, damped(walled, 1e-12), [2.1, 1.2])
+    found = minimise(walled, damped(walled, 1e-16), [2.1, 1.2])
     assert went_well(found)
     np.testing.assert_allclose(gradient(np.asarray(found.value)), 0.0, atol=1e-4)
     assert np.linalg.eigvalsh(hessian(np.asarray(found.value)))[0] > 0.0
