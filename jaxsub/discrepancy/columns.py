@@ -134,8 +134,7 @@ def plausible(view: View, effect: AbstractEffect) -> bool:
     """
     if not isinstance(effect, AbstractSensor):
         return True
-    column = view.vehicle.layout.channels.index(effect.channel)
-    measured = np.asarray(view.runs.outputs)[..., column][np.asarray(view.runs.mask)[..., column]]
+    measured = view.measured(effect.channel)
     shown = max(np.ptp(view.path.true[effect.channel]), np.ptp(measured)) if measured.size else 0.0
     return bool(np.ptp(sensor_change(view.path, effect)) <= shown)
 

@@ -145,21 +145,19 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     log = np.where(may, scan.value, -np.inf)
     weights = np.exp(log - np.max(log))
     weights /= np.sum(weights)
-    by_name: dict[str, float] = {}
-    best: dict[str, int] = {}
-    # the same effect elsewhere is no rival, but a twin may be
-    elsewhere: dict[str, int] = {}
     own, label = selector.candidates[index].name, selector.candidates[index].label
+    by_name: dict[str, float] = {}
+    # of its own effect the best in every place: elsewhere it is no rival, but may be a twin
+    best: dict[str, int] = {}
     for i, (effect, weight) in enumerate(zip(selector.candidates, weights, strict=True)):
         by_name[effect.name] = by_name.get(effect.name, 0.0) + float(weight)
-        foremost, key = (elsewhere, effect.label) if effect.name == own else (best, effect.name)
-        if log[i] > log[foremost.setdefault(key, i)]:
-            foremost[key] = i
+        key = effect.label if effect.name == own else effect.name
+        if log[i] > log[best.setdefault(key, i)]:
+            best[key] = i
     rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > _POSSIBLE]
-    forms = [*best.values(), *(i for other, i in elsewhere.items() if other != label)]
     # what coefficients absorb of an effect, they absorb of the picture's errors too, but not as exactly
     off = min(_FAR_OFF, _OFF / np.sqrt(max(selector.kept[index], 1e-12)))
-    near = [j for j in forms if np.isfinite(log[j])]
+    near = [j for key, j in best.items() if key != label and np.isfinite(log[j])]
     place = scan.effects[index].where
     far = lambda j: _SAME_PLACE if scan.effects[j].where == place else off
     near = [j for j in near if scan.statistic[j] > (1.0 - far(j)) * scan.statistic[index]]

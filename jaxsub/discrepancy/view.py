@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from functools import cached_property
 
 import equinox as eqx
 import jax
@@ -105,6 +105,11 @@ class View:
     base: Columns
     prior: Float[Array, "p1 p1"]
 
+    def measured(self, channel: str) -> np.ndarray:
+        """All samples that `channel` has in the recordings, SI."""
+        column = self.vehicle.layout.channels.index(channel)
+        return np.asarray(self.runs.outputs)[..., column][np.asarray(self.runs.mask)[..., column]]
+
 
 def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle | None = None) -> View:
     """The view of a fit, its free numbers moved to where innovations are least.
@@ -146,10 +151,9 @@ def _settled(led: "_Led", at: "_At", turns: Sequence[int]) -> "_At":
     for steps in turns:
         found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance, steps)
         at = led.descend(at.vehicle, found)
-        cost = at.cost
-        if abs(before - cost) < _SETTLED:
+        if abs(before - at.cost) < _SETTLED:
             break
-        before = cost
+        before = at.cost
     return at
 
 
@@ -169,7 +173,8 @@ def _white(fit: Fit) -> Array:
     return jnp.asarray(np.where(given, 1.0, np.clip(white, _LEAST_WHITE, 1.0)))
 
 
-class _At(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class _At:
     """The runs followed by a vehicle under a disturbance, its columns of unit length, their priors, and the lengths."""
 
     vehicle: AbstractVehicle
@@ -179,9 +184,9 @@ class _At(NamedTuple):
     prior: Array
     length: np.ndarray
 
-    @property
+    @cached_property
     def cost(self) -> float:
-        """Minus the log restricted likelihood."""
+        """Minus the log restricted likelihood, a pass of the filter."""
         return float(_restricted(self.disturbance, self.followed.system, self.base, self.prior))
 
 
@@ -248,11 +253,11 @@ def _left(view: View) -> Columns:
 def facts(view: View) -> Facts:
     """What the vocabulary needs to know to list its candidates."""
     layout, runs, path = view.vehicle.layout, view.runs, view.path
-    live, mask, outputs = np.asarray(runs.live), np.asarray(runs.mask), np.asarray(runs.outputs)
+    live = np.asarray(runs.live)
     rms = lambda values: max(float(np.sqrt(np.mean(np.asarray(values)[live] ** 2))), 1e-9)
     body = layout.kind == "submerged-body"
     depth = np.asarray(path.seen.positions["z"]) if body else np.zeros(1)
-    shown = {c: outputs[..., i][mask[..., i]] for i, c in enumerate(layout.channels)}
+    shown = {channel: view.measured(channel) for channel in layout.channels}
     duration, interval = float(np.max(np.sum(path.steps, axis=1))), float(np.median(path.steps[live]))
     shaking, frequencies = [], 0
     if body and duration > 0.0:
