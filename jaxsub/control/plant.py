@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import VELOCITIES, AbstractActuator, AbstractEffect, AbstractSensor
+from ..effects import VELOCITIES, AbstractActuator, AbstractEffect, AbstractInstrument, AbstractSensor
 from ..errors import InputError, require_known
 from ..filter.model import linearised
 from ..simulate import Sampled, step_table
@@ -166,10 +166,10 @@ class Plant(eqx.Module):
         shown, motion = self.vehicle.truth(now, state, signals)
         after: dict[int, Array] = {}
         for i, effect in enumerate(self.vehicle.effects):
-            if not isinstance(effect, AbstractSensor):
+            if not isinstance(effect, AbstractInstrument):
                 continue
-            if not effect.remembers:
-                shown[effect.channel] = effect.measure(now, shown, motion)
+            if not isinstance(effect, AbstractSensor) or not effect.remembers:
+                shown |= effect.show(now, shown, motion)
                 continue
             size, true = self.sizes[i], jnp.asarray(shown[effect.channel])
             past = jnp.full(size, true) if memory is None else memory[i]

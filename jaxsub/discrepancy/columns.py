@@ -14,8 +14,8 @@ from ..effects import (
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
+    AbstractInstrument,
     AbstractMemory,
-    AbstractSensor,
     Motion,
     amplitudes,
     numbers,
@@ -37,7 +37,7 @@ def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple
     it makes at its grid value, and the difference that a little more of it would make.
     """
     made = [_effect_columns(view, effect) for effect in candidates]
-    shows = [isinstance(effect, AbstractSensor) for effect in candidates]
+    shows = [isinstance(effect, AbstractInstrument) for effect in candidates]
     of_sort = lambda shown: [c for own, kind in zip(made, shows, strict=True) if kind is shown for c in own]
     forces, outputs = of_sort(False), of_sort(True)
     # forces come first
@@ -87,10 +87,11 @@ def difference(view: View, effect: AbstractEffect) -> np.ndarray:
         if isinstance(effect, AbstractMemory):
             ends = with_memory(effect, *ends, path.steps)
         return np.stack([stacked_force(vehicle, effect, motion) for motion in ends])
-    assert isinstance(effect, AbstractSensor)
+    assert isinstance(effect, AbstractInstrument)
     channels = vehicle.layout.channels
     change = np.zeros((*path.times.shape, len(channels)))
-    change[..., channels.index(effect.channel)] = sensor_change(path, effect)
+    for channel, part in sensor_changes(path, effect).items():
+        change[..., channels.index(channel)] = part
     return change
 
 
@@ -132,13 +133,17 @@ def plausible(view: View, effect: AbstractEffect) -> bool:
 
     Of what it should show and what was measured, whichever is more: on a long arm a log feels mostly the turning.
     """
-    if not isinstance(effect, AbstractSensor):
+    if not isinstance(effect, AbstractInstrument):
         return True
-    measured = view.measured(effect.channel)
-    shown = max(np.ptp(view.path.true[effect.channel]), np.ptp(measured)) if measured.size else 0.0
-    return bool(np.ptp(sensor_change(view.path, effect)) <= shown)
+
+    def shown(channel: str) -> float:
+        measured = view.measured(channel)
+        return float(max(np.ptp(view.path.true[channel]), np.ptp(measured))) if measured.size else 0.0
+
+    return all(float(np.ptp(part)) <= shown(channel) for channel, part in sensor_changes(view.path, effect).items())
 
 
-def sensor_change(path: Trajectory, effect: AbstractSensor) -> np.ndarray:
-    """What a sensor effect changes in its channel, (R, K)."""
-    return np.asarray(effect.measure(jnp.asarray(path.times), path.true, path.seen)) - path.true[effect.channel]
+def sensor_changes(path: Trajectory, effect: AbstractInstrument) -> dict[str, np.ndarray]:
+    """What a sensor effect changes in each of its channels, (R, K)."""
+    shown = effect.show(jnp.asarray(path.times), path.true, path.seen)
+    return {channel: np.asarray(part) - path.true[channel] for channel, part in shown.items()}

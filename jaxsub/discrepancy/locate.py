@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractActuator, AbstractEffect, AbstractSensor, Motion, by_name, velocities
+from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, Motion, by_name, velocities
 from ..likelihood import Disturbance, products
 from ..recording import Recording
 from .columns import difference, force_columns, output_columns
@@ -63,8 +63,8 @@ def shares(view: View, scan: Scan) -> dict[str, float]:
         without = view.disturbance.force.at[i].multiply(1e-3)
         found[equation] = max(0.0, whole - _likelihood(view, dataclasses.replace(view.disturbance, force=without)))
     for effect, statistic, right in zip(scan.effects, scan.statistic, scan.right, strict=True):
-        if right and isinstance(effect, AbstractSensor | AbstractActuator):
-            found[effect.where[0]] = max(found.get(effect.where[0], 0.0), 0.5 * float(statistic))
+        for place in effect.where if right and isinstance(effect, AbstractInstrument | AbstractActuator) else ():
+            found[place] = max(found.get(place, 0.0), 0.5 * float(statistic) / len(effect.where))
     total = max(sum(found.values()), 1e-300)
     return {place: part / total for place, part in found.items()}
 
@@ -78,11 +78,11 @@ def _likelihood(view: View, disturbance: Disturbance) -> float:
 def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Disturbance) -> dict[str, float]:
     """How the trace of accepted effects divides among the equations, actuators and sensors they act on."""
     pushed, shown = [], []
-    equations = view.vehicle.layout.equations
+    equations, channels = view.vehicle.layout.equations, view.vehicle.layout.channels
     for effect in effects:
         whole = difference(view, effect)
-        if isinstance(effect, AbstractSensor):
-            shown.append((effect.where[0], whole))
+        if isinstance(effect, AbstractInstrument):
+            shown += [(f"sensor:{c}", whole * (np.asarray(channels) == c)) for c in effect.channels]
         elif isinstance(effect, AbstractActuator):
             pushed.append((effect.where[0], whole))
         else:

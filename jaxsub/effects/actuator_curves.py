@@ -23,8 +23,8 @@ class ActuatorSaturation(AbstractCurve):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[ActuatorSaturation]":
-        """Each actuator with limits from half to nine tenths of its largest command."""
-        parts = (0.5, 0.6, 0.7, 0.8, 0.9)
+        """Each actuator with limits from half to just below its largest command."""
+        parts = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98)
         return [cls(name, number(part * size)) for name, size in facts.largest_commands.items() for part in parts]
 
     @property

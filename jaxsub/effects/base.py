@@ -136,8 +136,31 @@ class AbstractCurve(AbstractActuator):
         return memory, self.bend(nodes)
 
 
-class AbstractSensor(AbstractEffect):
-    """An effect that stands between a true output and what is recorded of it."""
+class AbstractInstrument(AbstractEffect):
+    """An effect that stands between true outputs and what an instrument of one or more channels records of them."""
+
+    @property
+    @abc.abstractmethod
+    def channels(self) -> tuple[str, ...]:
+        """What it changes."""
+
+    @abc.abstractmethod
+    def show(
+        self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> dict[str, Float[Array, " *k"]]:
+        """What each of its `channels` shows at `times` (s from the run's start), given the `outputs` without it.
+
+        Leading axes of `outputs` and `motion` follow those of `times`, the last of which is time.
+        """
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The sensors."""
+        return tuple(f"sensor:{channel}" for channel in self.channels)
+
+
+class AbstractSensor(AbstractInstrument):
+    """An effect on one channel."""
 
     channel: eqx.AbstractVar[str]
 
@@ -146,10 +169,18 @@ class AbstractSensor(AbstractEffect):
 
     @abc.abstractmethod
     def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
-        """What the sensor shows at `times` (s from the run's start), given the `outputs` of all sensors without it.
+        """What `show` says of the channel."""
 
-        Leading axes of `outputs` and `motion` follow those of `times`, the last of which is time.
-        """
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The one."""
+        return (self.channel,)
+
+    def show(
+        self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> dict[str, Float[Array, " *k"]]:
+        """The channel."""
+        return {self.channel: self.measure(times, outputs, motion)}
 
     def remembered(self, interval: float) -> int:
         """How many earlier true samples of its channel, `interval` s apart, `measure` has to see.
@@ -165,11 +196,6 @@ class AbstractSensor(AbstractEffect):
     def undone(self, times: Float[Array, " *k"], recorded: Float[Array, " *k"]) -> Float[Array, " *k"]:
         """`recorded`, of one run, brought to the times at which it was true; only what `remembers` has to say how."""
         return recorded
-
-    @property
-    def where(self) -> tuple[str, ...]:
-        """The sensor."""
-        return (f"sensor:{self.channel}",)
 
 
 def number_fields(effect: AbstractEffect | type[AbstractEffect]) -> list[dataclasses.Field]:

@@ -7,10 +7,12 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .base import AbstractSensor, amplitude
+from ..errors import InputError
+from .base import AbstractInstrument, amplitude
 from .motion import EQUATIONS, VELOCITIES, Facts, Motion, Signal
 
 _TRIADS = (("u", "v", "w"), ("p", "q", "r"), ("ax", "ay", "az"))
+_ARMED = (_TRIADS[0], ("x", "y", "z"), _TRIADS[2])
 _EQUATIONS = {velocity: equation for equation, velocity in VELOCITIES.items()}
 # the turning rates that move a sensor off the axis, by channel and axis
 _TURNS = {
@@ -21,11 +23,23 @@ _TURNS = {
 }  # fmt: skip
 
 
-class SensorMisalignment(AbstractSensor):
+class _Mounting(AbstractInstrument):
+    """Of an instrument whose channels, one or more of a triad, are listed with commas between."""
+
+    channel: eqx.AbstractVar[str]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Those listed."""
+        return tuple(self.channel.split(","))
+
+
+class SensorMisalignment(_Mounting):
     r"""A sensor that is turned in its mounting and so sees something of another axis: $z = y + \varepsilon\,y_{other}$.
 
-    $\varepsilon$ in rad, of either sign, small. Of an attitude it is a bias, which is another effect.
-    Source: Titterton and Weston (2004), §4; Groves (2013), §4.4.
+    $\varepsilon$ in rad, of either sign, small. An instrument turned about one axis shows it in the other two:
+    $z = y + y\times\varepsilon$, in `q,r` that see `r,q`: $z_q = q + \varepsilon r$, $z_r = r - \varepsilon q$. Of an
+    attitude it is a bias, which is another effect. Source: Titterton and Weston (2004), §4; Groves (2013), §4.4.
     """
 
     name: ClassVar[str] = "sensor-misalignment"
@@ -34,30 +48,50 @@ class SensorMisalignment(AbstractSensor):
     sees: str = eqx.field(static=True)
     epsilon: Array = amplitude("rad")
 
+    def __check_init__(self):
+        pairs = set(zip(self.channels, self.sees.split(","), strict=False))
+        known = {(a, b) for triad in _TRIADS for a in triad for b in triad if a != b}
+        if self.sees.count(",") != self.channel.count(",") or not pairs <= known:
+            remedy = "name for each channel another axis of its triad, as channel = 'q,r' and sees = 'r,q'"
+            raise InputError(self.label, f"{self.channel} cannot see {self.sees}", remedy)
+
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorMisalignment]":
-        """Each velocity, rate and specific force of a body with the other two axes, where these move and are known."""
+        """Each velocity, rate and specific force of a body with the other two axes, where these move and are known.
+
+        And any two of a triad, as one instrument has them.
+        """
         free = [VELOCITIES[e] for e in facts.equations] if facts.kind == "submerged-body" else []
         known = [*free, *(c for c in facts.channels if c in _TRIADS[2])] if free else []
         triads = [(c, triad) for c in facts.channels for triad in _TRIADS if c in triad]
-        return [cls(c, other) for c, triad in triads for other in triad if other != c and other in known]
+        alone = [cls(c, other) for c, triad in triads for other in triad if other != c and other in known]
+        turned = [pair for a, b, c in _TRIADS for pair in ((b, c), (c, a), (a, b)) if {*pair} <= {*known}]
+        return [*alone, *(cls(f"{b},{c}", f"{c},{b}") for b, c in turned if {b, c} <= {*facts.channels})]
 
     @property
     def expression(self) -> str:
         """The cross-talk."""
-        return f"{self.channel} measured = {self.channel} + ε {self.sees}"
+        return ", ".join(f"{c} measured = {c} {'-+'[sign > 0]} ε {other}" for c, other, sign in self._pairs())
 
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
-        """The output with a little of the other axis."""
-        rates = {velocity: motion.rates[equation] for velocity, equation in _EQUATIONS.items()}
-        return jnp.asarray(outputs[self.channel] + self.epsilon * (rates | dict(outputs))[self.sees])
+    def show(
+        self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> dict[str, Float[Array, " *k"]]:
+        """The outputs with a little of the other axis."""
+        true = {velocity: motion.rates[equation] for velocity, equation in _EQUATIONS.items()} | dict(outputs)
+        return {c: jnp.asarray(outputs[c] + sign * self.epsilon * true[other]) for c, other, sign in self._pairs()}
+
+    def _pairs(self) -> list[tuple[str, str, float]]:
+        """Each channel, what it sees, and the sign."""
+        signs = (1.0, -1.0)[: len(self.channels)]
+        return list(zip(self.channels, self.sees.split(","), signs, strict=True))
 
 
-class SensorLeverArm(AbstractSensor):
+class SensorLeverArm(_Mounting):
     r"""A sensor that sits a distance $l$ (m, either sign) along a body axis from where the model has it.
 
     A velocity sensor shows $\nu_1 + \nu_2\times l$, a position or depth sensor $\eta_1 + R\,l$, an accelerometer
-    $f + \dot\nu_2\times l + \nu_2\times(\nu_2\times l)$. Source: Titterton and Weston (2004), §3; Groves (2013), §6.4.
+    $f + \dot\nu_2\times l + \nu_2\times(\nu_2\times l)$. An instrument of several channels, such as `v,w`, has one arm.
+    Source: Titterton and Weston (2004), §3; Groves (2013), §6.4.
     """
 
     name: ClassVar[str] = "sensor-lever-arm"
@@ -66,46 +100,63 @@ class SensorLeverArm(AbstractSensor):
     axis: str = eqx.field(static=True)
     arm: Array = amplitude("m")
 
+    def __check_init__(self):
+        what = f"no arm along {self.axis} shows in {self.channel}"
+        if self.axis not in ("x", "y", "z"):
+            raise InputError(self.label, what, "give the axis x, y or z")
+        if not set(self.channels) <= set(_TURNS):
+            raise InputError(self.label, what, f"one shows in {', '.join(_TURNS)}")
+
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorLeverArm]":
-        """Each velocity, position and specific force of a body with the axes along which an arm shows."""
+        """Each velocity, position and specific force of a body with the axes along which an arm shows.
+
+        And those of a triad that an arm of one instrument shows in.
+        """
         free = [VELOCITIES[e] for e in facts.equations] if facts.kind == "submerged-body" else []
-        arms = {channel: _TURNS.get(channel, {}) for channel in facts.channels}
-        return [cls(channel, axis) for channel, turns in arms.items() for axis, rate in turns.items() if rate in free]
+        shows = lambda channel, axis: _TURNS.get(channel, {}).get(axis) in free
+        alone = [cls(c, axis) for c in facts.channels for axis in "xyz" if shows(c, axis)]
+        felt = [([c for c in triad if c in facts.channels and shows(c, x)], x) for triad in _ARMED for x in "xyz"]
+        return [*alone, *(cls(",".join(own), axis) for own, axis in felt if len(own) > 1)]
 
     @property
     def expression(self) -> str:
         """The motion of the sensor about the origin."""
-        if self.channel in _TRIADS[0]:
-            return f"{self.channel} measured = {self.channel} + (ν2 × l_{self.axis})"
-        if self.channel in _TRIADS[2]:
-            return f"{self.channel} measured = {self.channel} + (dν2/dt × l_{self.axis} + ν2 × (ν2 × l_{self.axis}))"
-        return f"{self.channel} measured = {self.channel} + (R l_{self.axis})"
+        return ", ".join(f"{channel} measured = {channel} + {self._said(channel)}" for channel in self.channels)
 
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
-        """The output where the sensor is."""
-        return jnp.asarray(outputs[self.channel] + self.arm * self._per_metre(motion))
+    def _said(self, channel: str) -> str:
+        if channel in _TRIADS[0]:
+            return f"(ν2 × l_{self.axis})"
+        if channel in _TRIADS[2]:
+            return f"(dν2/dt × l_{self.axis} + ν2 × (ν2 × l_{self.axis}))"
+        return f"(R l_{self.axis})"
 
-    def _per_metre(self, motion: Motion) -> Signal:
+    def show(
+        self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> dict[str, Float[Array, " *k"]]:
+        """The outputs where the sensor is."""
+        return {c: jnp.asarray(outputs[c] + self.arm * self._per_metre(c, motion)) for c in self.channels}
+
+    def _per_metre(self, channel: str, motion: Motion) -> Signal:
         unit = jnp.eye(3)["xyz".index(self.axis)]
         turning = jnp.stack(jnp.broadcast_arrays(*(motion.rates[e] for e in EQUATIONS[3:])), -1)
         moved = jnp.cross(turning, jnp.broadcast_to(unit, turning.shape))
-        if self.channel in _TRIADS[0]:
-            return moved[..., _TRIADS[0].index(self.channel)]
-        if self.channel in _TRIADS[2]:
+        if channel in _TRIADS[0]:
+            return moved[..., _TRIADS[0].index(channel)]
+        if channel in _TRIADS[2]:
             still = jnp.zeros_like(turning[..., 0])
             spin = jnp.stack([motion.accelerations.get(e, still) for e in EQUATIONS[3:]], -1)
             felt = jnp.cross(spin, jnp.broadcast_to(unit, spin.shape)) + jnp.cross(turning, moved)
-            return felt[..., _TRIADS[2].index(self.channel)]
-        return self._turned(motion)
+            return felt[..., _TRIADS[2].index(channel)]
+        return self._turned(channel, motion)
 
-    def _turned(self, motion: Motion) -> Signal:
+    def _turned(self, channel: str, motion: Motion) -> Signal:
         """Entry of R(φ, θ, ψ) by the position's row and the arm's column."""
         phi, theta, psi = (motion.positions[name] for name in ("phi", "theta", "psi"))
         level = {"x": jnp.cos(theta), "y": jnp.sin(theta) * jnp.sin(phi), "z": jnp.sin(theta) * jnp.cos(phi)}[self.axis]
         across = {"x": jnp.zeros_like(phi), "y": jnp.cos(phi), "z": -jnp.sin(phi)}[self.axis]
-        if self.channel == "x":
+        if channel == "x":
             return level * jnp.cos(psi) - across * jnp.sin(psi)
-        if self.channel == "y":
+        if channel == "y":
             return level * jnp.sin(psi) + across * jnp.cos(psi)
         return {"x": -jnp.sin(theta), "y": jnp.cos(theta) * jnp.sin(phi), "z": jnp.cos(theta) * jnp.cos(phi)}[self.axis]

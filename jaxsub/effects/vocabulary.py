@@ -8,7 +8,7 @@ from pathlib import Path
 from ..errors import InputError
 from .actuator_curves import ActuatorDeadband, ActuatorMisalignment, ActuatorSaturation, ControlSurfaceStall
 from .actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
-from .base import AbstractActuator, AbstractEffect, AbstractForce, AbstractSensor
+from .base import AbstractActuator, AbstractEffect, AbstractForce, AbstractInstrument
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
 from .environment import Current, WaveForcing
 from .events import MassShift, ThrustLoss
@@ -121,7 +121,7 @@ def from_script(path: str | Path) -> tuple[type[AbstractEffect], ...]:
 
 def is_effect(kind: object) -> bool:
     """Whether `kind` is a force, an actuator's or a sensor's effect that can be made, with a name and a family."""
-    if not (inspect.isclass(kind) and issubclass(kind, AbstractForce | AbstractActuator | AbstractSensor)):
+    if not (inspect.isclass(kind) and issubclass(kind, AbstractForce | AbstractActuator | AbstractInstrument)):
         return False
     named = isinstance(getattr(kind, "name", None), str) and isinstance(getattr(kind, "family", None), str)
     return named and not inspect.isabstract(kind)

@@ -13,8 +13,8 @@ from ..effects import (
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
+    AbstractInstrument,
     AbstractMemory,
-    AbstractSensor,
     Motion,
     Signal,
     parameter_table,
@@ -200,8 +200,8 @@ class AbstractVehicle(eqx.Module):
         """What the sensors show at `times`, s from the run's start."""
         shown, motion = self.truth(times, state, signals)
         for effect in self.effects:
-            if isinstance(effect, AbstractSensor):
-                shown[effect.channel] = effect.measure(times, shown, motion)
+            if isinstance(effect, AbstractInstrument):
+                shown |= effect.show(times, shown, motion)
         return stack(shown, self.layout.channels, times)
 
     def truth(

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import jax.numpy as jnp
 import numpy as np
 
-from ..effects import CHANNEL_UNITS, EQUATIONS, VELOCITIES, AbstractActuator, AbstractForce, AbstractSensor
+from ..effects import CHANNEL_UNITS, EQUATIONS, VELOCITIES, AbstractActuator, AbstractForce, AbstractInstrument
 from ..errors import InputError, nearest
 from .base import Layout
 from .control import ACTUATORS, needs
@@ -85,9 +85,10 @@ def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
         if isinstance(effect, AbstractActuator) and effect.actuator not in dict(layout.inputs):
             hint = nearest(effect.actuator, [n for n, _ in layout.inputs]) or "an actuator of [inputs]"
             raise InputError(place, f"no actuator {effect.actuator}", f"use {hint}")
-        if isinstance(effect, AbstractSensor) and effect.channel not in layout.channels:
-            hint = nearest(effect.channel, list(layout.channels)) or "a channel of [outputs]"
-            raise InputError(place, f"no channel {effect.channel}", f"use {hint}")
+        for channel in effect.channels if isinstance(effect, AbstractInstrument) else ():
+            if channel not in layout.channels:
+                hint = nearest(channel, list(layout.channels)) or "a channel of [outputs]"
+                raise InputError(place, f"no channel {channel}", f"use {hint}")
 
 
 def _check_force(effect: AbstractForce, vehicle: SubmergedBody | Mechanism, place: str) -> None:

@@ -112,7 +112,12 @@ def _read_effects(
         kind = kinds[table.choice("effect", tuple(kinds))]
         chosen = {field.name.rstrip("_"): field for field in _option_fields(kind)}
         table.only(("effect", "expression", "parameters", *chosen))
-        effect = kind(**{field.name: read_option(table, key, field.type) for key, field in chosen.items()})
+        given_options = {field.name: read_option(table, key, field.type) for key, field in chosen.items()}
+        try:
+            effect = kind(**given_options)
+        except InputError as error:  # options that do not go together; it does not know the file
+            what, _, remedy = str(error).partition("; ")
+            raise InputError(f"{where}: effects[{number}]", what, remedy) from error
         table_rows = _rows(effect, f"{where}: effects[{number}]")
         symbols = {symbol: field for field, symbol in effect.symbols().items()}
         given = table.table("parameters")

@@ -1,20 +1,23 @@
 """Evidence is the Gaussian integral that it claims to be, χ² under the null, and largest for what was concealed."""
 
 import dataclasses
+from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from diagnosis_cases import recorded, wrong
+from jax import Array
 from scipy import stats
 
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.columns import candidate_columns
 from jaxsub.discrepancy.evidence import Evidence, Products, evidence_of
+from jaxsub.discrepancy.locate import effect_shares
 from jaxsub.discrepancy.name import select
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.view import facts, look
-from jaxsub.effects import candidates
+from jaxsub.effects import AbstractInstrument, amplitude, candidates
 from jaxsub.effects.hull import CrossflowDrag
 from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import fit
@@ -112,6 +115,36 @@ def test_wrong_scale_of_the_noise_raises_no_alarm():
     chosen, _, p_values = select(Selector(Evidence.of(view, columns), tried, owners, {}), lambda message: None)
     assert chosen == [] and p_values[0] > 0.01
     assert jnp.isfinite(view.covariance).all()
+
+
+class Gain(AbstractInstrument):
+    """One gain of two channels."""
+
+    name: ClassVar[str] = "one-gain"
+    family: ClassVar[str] = "own"
+    gain: Array = amplitude("1")
+    channels: ClassVar[tuple[str, ...]] = ("w", "q")
+    expression: ClassVar[str] = "(1 + gain) w, (1 + gain) q"
+
+    @classmethod
+    def candidates(cls, facts):
+        return [cls()]
+
+    def show(self, times, outputs, motion):
+        return {channel: (1.0 + self.gain) * outputs[channel] for channel in self.channels}
+
+
+def test_an_instrument_is_one_column_in_all_its_channels_and_its_trace_is_theirs(clean):
+    columns, owners = candidate_columns(clean, [Gain()])
+    assert owners == [[0]]
+    channels = clean.vehicle.layout.channels
+    shown = np.asarray(columns.shown)[..., 0] * np.asarray(clean.sigma)
+    for i, channel in enumerate(channels):
+        expected = clean.path.true[channel] if channel in ("w", "q") else 0.0
+        np.testing.assert_allclose(shown[..., i], np.where(clean.runs.mask[..., i], expected, 0.0), atol=1e-12)
+    share = effect_shares(clean, [Gain(0.1)], clean.disturbance)
+    assert set(share) == {"sensor:w", "sensor:q"}
+    assert min(share.values()) > 0.01 and sum(share.values()) == pytest.approx(1.0)
 
 
 def test_a_view_is_the_same_from_wherever_its_disturbance_is_sought():

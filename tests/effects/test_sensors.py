@@ -1,5 +1,7 @@
 """Sensors show what one that is late, turned, off the centre, at its end or without sign shows, as NumPy has it."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -23,7 +25,9 @@ TRUTH |= {"v": TRUTH["u"] ** 2, "w": TRUTH["u"] ** 3, "ay": TRUTH["ax"] ** 2, "d
 
 
 def read(effect, times=TIMES, truth=TRUTH):
-    return np.asarray(effect.measure(jnp.asarray(times), {c: jnp.asarray(y) for c, y in truth.items()}, NOW))
+    found = effect.show(jnp.asarray(times), {c: jnp.asarray(y) for c, y in truth.items()}, NOW)
+    assert tuple(found) == effect.channels
+    return np.asarray(found[effect.channel]) if len(found) == 1 else found
 
 
 def test_delay_is_the_line_between_the_samples_a_while_ago():
@@ -65,6 +69,27 @@ def test_a_turned_sensor_sees_the_other_axis():
     pairs = {(e.channel, e.sees) for e in SensorMisalignment.candidates(BODY)}
     # nothing records the other two specific forces
     assert pairs == {("u", "v"), ("u", "w"), ("r", "p"), ("r", "q")}
+
+
+def test_a_gyro_turned_about_an_axis_errs_by_the_rate_across_that_axis():
+    turning = rows(EQUATIONS[3:], NOW.rates)
+    truth = TRUTH | dict(zip("pqr", turning.T, strict=True))
+    for axis, (own, others) in enumerate((("q,r", "r,q"), ("r,p", "p,r"), ("p,q", "q,p"))):
+        found = read(SensorMisalignment(own, others, jnp.asarray(0.03)), truth=truth)
+        expected = turning + np.cross(turning, 0.03 * np.eye(3)[axis])
+        for channel, shown in found.items():
+            np.testing.assert_allclose(shown, expected[:, "pqr".index(channel)], rtol=1e-12)
+
+
+def test_an_instrument_of_several_channels_is_suspected_whole():
+    log = dataclasses.replace(BODY, channels=("v", "w", "q", "r", "p"))
+    arms = {(e.channel, e.axis) for e in SensorLeverArm.candidates(log) if len(e.channels) > 1}
+    assert arms == {("v,w", "x")}
+    turned = {(e.channel, e.sees) for e in SensorMisalignment.candidates(log) if len(e.channels) > 1}
+    assert turned == {("v,w", "w,v"), ("q,r", "r,q"), ("r,p", "p,r"), ("p,q", "q,p")}
+    arm = read(SensorLeverArm("v,w", "x", jnp.asarray(0.6)))
+    for channel in "vw":
+        np.testing.assert_array_equal(arm[channel], read(SensorLeverArm(channel, "x", jnp.asarray(0.6))))
 
 
 def rows(names, source):

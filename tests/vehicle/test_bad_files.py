@@ -46,6 +46,9 @@ outputs.x_rate.sigma = 0.1
 effects = [{ effect = "coulomb-friction", equation = "x", smoothing = 0.1 }]
 """
 SWAY = 'equation = "sway"\nparameters = { Y_vv = -3.0 }'
+BIAS = '"sensor-bias"\nchannel = "r"'
+ARM = '"sensor-lever-arm"\nchannel = "r"\naxis = "x"'
+TURNED = '"sensor-misalignment"\nchannel = "r"\nsees = "u"'
 # what is written instead of what, and how the refusal goes on after the name of the file
 MISTAKES = {
     "unknown section": ("[inputs]", "[imputs]", ": imputs: unknown key; did you mean inputs?"),
@@ -92,6 +95,9 @@ MISTAKES = {
     "unknown parameter": ("Y_vv =", "Y_rr =", r": effects\[1\].parameters.Y_rr: unknown key; known: Y_vv"),
     "effect of no actuator": ('actuator = "rudder"', 'actuator = "ruder"', r": effects.*no actuator ruder; use rudder"),
     "effect of no channel": ('channel = "r"', 'channel = "p"', ": effects.*no channel p; use a channel of"),
+    "arm that does not show": (BIAS, ARM, r": effects\[3\]: .*: no arm along x shows in r; one shows in u, "),
+    "arm along no axis": (BIAS, ARM.replace('"x"', '"q"'), r": effects\[3\]: .*: no arm along q .*axis x, y or z"),
+    "axis of another sensor": (BIAS, TURNED, r": effects\[3\]: .*: r cannot see u; name for each channel another"),
     "effect twice": ('"sensor-bias"\nchannel = "r"', '"actuator-lag"\nactuator = "rudder"', r": effects\[3\].*twice; "),
 }  # fmt: skip
 RIG_MISTAKES = {
