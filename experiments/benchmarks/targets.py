@@ -30,8 +30,10 @@ def judged(found: Mapping[str, dict]) -> dict[str, dict]:
         ratio = found["likelihood"]["ratios"]["forward_jacobian_in_simulations"]
         row("forward Jacobian of 25 coefficients, in simulations", ratio, 4.0, more=False)
     if "diagnose" in found:
-        row("diagnose, cold, s", found["diagnose"]["cold"]["seconds"], 20.0, more=False)
-        row("diagnose, cached, s", found["diagnose"]["warm"]["seconds"], 3.0, more=False)
+        for label, aim in (("cold", 20.0), ("warm", 3.0)):
+            making = found["diagnose"][label]["making_programs_s"]
+            seconds = sum(making[part] for part in ("trace", "lower", "compile_or_read"))
+            row(f"making the programs of a diagnosis, {label}, s", seconds, aim, more=False)
     for what in ("samples", "batch", "candidates"):
         if "growth" in found:
             row(f"growth with {what}: slope of time", found["growth"][what]["slope_of_time"], 1.05, more=False)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
+from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, numbers, with_numbers
 from ..estimate import Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
@@ -46,11 +46,15 @@ def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: f
 
 
 def sound(fit: Fit, effects: Sequence[AbstractEffect]) -> bool:
-    """Whether all of `effects` came out of a fit with signs that physics admits, and none of them vanished."""
-    labels = {effect.label for effect in effects}
+    """Whether all of `effects` came out of a fit with signs that physics admits, and none of them vanished.
+
+    A force whose memory is over within a sample is one without: what it then does, coefficients do.
+    """
+    labels, interval = {effect.label for effect in effects}, float(np.min(fit.runs.steps))
     for effect in (e for e in fit.vehicle.effects if e.label in labels):
-        found, linear = numbers(effect), amplitudes(effect)
-        if not admissible(effect, found) or any(v <= _VANISHED for n, v in found.items() if n not in linear):
+        found, linear, units = numbers(effect), amplitudes(effect), effect.units()
+        least = {n: interval if isinstance(effect, AbstractMemory) and units[n] == "s" else _VANISHED for n in found}
+        if not admissible(effect, found) or any(v <= least[n] for n, v in found.items() if n not in linear):
             return False
     return True
 

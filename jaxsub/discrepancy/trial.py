@@ -42,6 +42,11 @@ class Found:
     pattern: Pattern | None
     memory: Memory
 
+    @property
+    def remains(self) -> bool:
+        """Whether there is something beside what was named."""
+        return self.memory.correlated or (self.pattern is not None and self.pattern.significant)
+
 
 class Model(NamedTuple):
     """A fit, its view, what it shows on the held-out runs, and the effects that were added to the baseline."""

@@ -15,8 +15,6 @@ _EXPLAINED = 0.75
 # log evidence by which a force without a name must beat the names to stand instead of them
 _CLEARLY = 3.0
 _BEYOND_DOUBT = 1e-6
-# of innovations that are white
-_NOT_WHITE = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,11 +46,10 @@ def judge(naming: Naming, pattern: Pattern | None, memory: Memory) -> Judged:
     notes: list[str] = []
     if pattern is not None and follows:
         notes.append(f"{pattern.force.expression} is asked for in {pattern.force.equation}: {pattern.described}.")
-    correlated = memory.p_value < _NOT_WHITE
-    if correlated:
+    if memory.correlated:
         chance = f"that its samples are so correlated by chance has p = {memory.p_value:.2g}"
         notes.append(f"What is left is not random: {chance}.")
-    if not naming.named and correlated and not follows:
+    if not naming.named and memory.correlated and not follows:
         return Judged("unknown", [], min(p_value, memory.p_value), notes)
     if not naming.named:
         return Judged("unknown" if follows else "none", [], p_value, notes)
@@ -63,7 +60,7 @@ def judge(naming: Naming, pattern: Pattern | None, memory: Memory) -> Judged:
     if pattern is not None and follows and pattern.explained < _EXPLAINED:
         notes.append(f"{labels} would explain {pattern.explained:.0%} of the mismatch, too little for its cause.")
         return Judged("unknown", [], p_value, notes)
-    if correlated and memory.explained < _EXPLAINED:
+    if memory.correlated and memory.explained < _EXPLAINED:
         notes.append(
             f"{labels} would explain {memory.explained:.0%} of it and of what is left, too little for its cause."
         )

@@ -10,6 +10,8 @@ from scipy import linalg, special
 _LAGS = (5, 20, 60)
 # samples from which the next is predicted
 _PAST = 20
+# probability below which innovations are not white
+_NOT_WHITE = 1e-3
 
 
 class Memory(NamedTuple):
@@ -23,6 +25,11 @@ class Memory(NamedTuple):
 
     p_value: float
     explained: float
+
+    @property
+    def correlated(self) -> bool:
+        """Whether they are not."""
+        return self.p_value < _NOT_WHITE
 
 
 RANDOM = Memory(1.0, 1.0)

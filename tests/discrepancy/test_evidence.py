@@ -6,7 +6,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from diagnosis_cases import recorded, wrong
+from diagnosis_cases import INTERVAL, recorded, wrong
 from jax import Array
 from scipy import stats
 
@@ -14,10 +14,11 @@ from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.columns import candidate_columns
 from jaxsub.discrepancy.evidence import Evidence, Products, evidence_of
 from jaxsub.discrepancy.locate import effect_shares
+from jaxsub.discrepancy.model import sound
 from jaxsub.discrepancy.name import select
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.view import facts, look
-from jaxsub.effects import AbstractInstrument, amplitude, candidates
+from jaxsub.effects import AbstractInstrument, FluidMemory, amplitude, candidates
 from jaxsub.effects.hull import CrossflowDrag
 from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import fit
@@ -25,8 +26,13 @@ from jaxsub.likelihood import Disturbance, whitened
 
 
 @pytest.fixture(scope="module")
-def clean():
-    return look(fit(wrong(), batch(wrong(), recorded(None, 1)[:2])))
+def fitted():
+    return fit(wrong(), batch(wrong(), recorded(None, 1)[:2]))
+
+
+@pytest.fixture(scope="module")
+def clean(fitted):
+    return look(fitted)
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +151,15 @@ def test_an_instrument_is_one_column_in_all_its_channels_and_its_trace_is_theirs
     share = effect_shares(clean, [Gain(0.1)], clean.disturbance)
     assert set(share) == {"sensor:w", "sensor:q"}
     assert min(share.values()) > 0.01 and sum(share.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("samples", "coefficient", "stands"), [(4.0, -9.0, True), (0.3, -9.0, False), (4.0, 9.0, False)]
+)
+def test_a_memory_that_is_over_within_a_sample_or_drives_is_unsound(fitted, samples, coefficient, stands):
+    memory = FluidMemory("pitch", coefficient, samples * INTERVAL)
+    found = dataclasses.replace(fitted, vehicle=fitted.vehicle.with_effect(memory))
+    assert sound(found, [memory]) is stands
 
 
 def test_a_view_is_the_same_from_wherever_its_disturbance_is_sought():
