@@ -62,12 +62,14 @@ class Passed(NamedTuple):
 def _met(carry: tuple[Array, Array], at: Steps) -> tuple[tuple[Array, Array], Passed]:
     """Covariance and means before the next sample, and what this one met."""
     P, X = carry
-    s, q = at.C.shape[1], at.shown.shape[1]
+    c, s = at.C.shape
     across = at.C @ P[:s]
     factor = jnp.linalg.cholesky(across[:, :s] @ at.C.T + jnp.diag(at.noise))
-    solved = solve_triangular(factor, jnp.concatenate([at.shown - at.C @ X[:s], across], axis=1), lower=True)
-    white, half = solved[:, :q], solved[:, q:]
-    after = at.F @ (X + half.T @ white)
+    # products with a small inverse are far faster than to solve for very many columns
+    inverse = solve_triangular(factor, jnp.eye(c, dtype=P.dtype), lower=True)
+    half = inverse @ across
+    white = inverse @ at.shown - (inverse @ at.C) @ X[:s]
+    after = at.F @ X + (at.F @ half.T) @ white
     after = after if at.forcing is None else after.at[:s].add(-at.forcing)
     return (at.F @ (P - half.T @ half) @ at.F.T + at.B @ at.B.T, after), Passed(white, factor, half, P, X)
 
