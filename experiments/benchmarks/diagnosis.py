@@ -123,10 +123,10 @@ def _told_apart() -> None:
     """Runs the command line, and prints how long JAX took to make its programs."""
     spent = {"programs": 0.0, **dict.fromkeys(_PARTS.values(), 0.0)}
 
-    def note(event: str, seconds: float, **_) -> None:
+    def note(event: str, duration_secs: float, **_) -> None:
         for words, part in _PARTS.items():
             if f"/{words}_duration" in event:
-                spent[part] += seconds
+                spent[part] += duration_secs
                 spent["programs"] += part == "compile_or_read"
 
     jax.monitoring.register_event_duration_secs_listener(note)

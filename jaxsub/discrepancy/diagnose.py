@@ -34,6 +34,8 @@ from .whiteness import RANDOM, Memory, memory
 _RIVALS = 2
 # and how many a page lists: the rest are less likely still
 _SHOWN = 4
+# times that others are asked where all that was named was refused
+_REFUSALS = 2
 
 
 def diagnose(
@@ -74,18 +76,23 @@ def explained(
     """The best model, and what is to be said.
 
     Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
-    they leave is not random: far from the truth a linear picture shows the largest alone.
+    they leave is not random: far from the truth a linear picture shows the largest alone. Where the held-out runs
+    refuse all that was named and the mismatch is beyond doubt, the rest of the vocabulary is asked.
     """
-    best, judged = baseline, NOTHING
+    best, judged, refusals = baseline, NOTHING, 0
     while True:
         said = judge(found.naming, found.pattern, found.memory)
         chosen = worth_trying(found, said)
         if chosen:
             best, said = tried(trial, best, found, chosen, said)
-        if said.verdict == "unknown" and not best.added:
-            # it stands for all that is missing, and not beside what was named
-            best, said = unnamed(trial, best, found, said)
         judged = both(judged, said)
+        if chosen and said.verdict == "unknown" and not best.added and refusals < _REFUSALS:
+            refusals += 1
+            found = weighed(found.view, found.selector, trial.progress)
+            continue
+        if judged.verdict == "unknown" and not best.added:
+            # it stands for all that is missing, and not beside what was named
+            best, judged = unnamed(trial, best, found, judged)
         whole = len(said.named) == len(found.naming.named) and not found.naming.again
         if not said.named or (whole and not found.remains) or len(best.added) >= MOST_EFFECTS:
             return best, judged
@@ -144,8 +151,12 @@ def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, pro
     listed = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
     columns, owners = candidate_columns(view, listed)
     evidence = Evidence.of(view, columns)
-    selector = Selector(evidence, listed, owners, looked_at(known, vocabulary))
-    naming = name(selector, progress)
+    return weighed(view, Selector(evidence, listed, owners, looked_at(known, vocabulary)), progress)
+
+
+def weighed(view: View, selector: Selector, progress: Progress) -> Found:
+    """What the candidates of a selector that are usable say, and a force without a name beside them."""
+    naming, evidence = name(selector, progress), selector.evidence
     if naming.again:
         return Found(view, selector, naming, None, RANDOM)
     progress("looking for forces without a name")

@@ -156,6 +156,7 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
 
     All together, or else the best that stands alone: where the model errs much, a linear
     picture adds effects that only make up for each other, and one of them put into the model shows what is left.
+    Where none does, those that were fitted are no candidates of `found` any more.
     """
     tries, effects = Tries(trial, base, found), found.selector.candidates
     kept = together(tries, chosen) if len(chosen) > 1 else {}
@@ -164,6 +165,8 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
     for index in [*refused, *kept]:
         judged = helped(judged, effects[index], tries.said[index])
     # how probable each is was said before twins were fitted, and with what was refused in the model
+    if not kept:
+        found.selector.usable[[key[0] for key in tries.models if len(key) == 1]] = False
     named = standing(found.selector, [*kept], refused)
     stand = [refitted(one, [(effects[i], value) for i, value in kept[one.number]]) for one in named]
     return tries.model([*kept]), settled(judged, stand)

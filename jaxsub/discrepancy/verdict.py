@@ -31,9 +31,10 @@ NOTHING = Judged("none", [], 1.0, [])
 
 
 def both(earlier: Judged, later: Judged) -> Judged:
-    """What is to be said once a model with what stands of `earlier` was looked at again."""
+    """What is to be said once a model with what stands of `earlier` was looked at again, or others were asked."""
     named, notes = [*earlier.named, *later.named], [*earlier.notes, *later.notes]
-    verdict = _certainty(named) if named else later.verdict
+    missed: Verdict = "unknown" if earlier.verdict == "unknown" else later.verdict
+    verdict = _certainty(named) if named else missed
     return Judged(verdict, named, min(earlier.p_value, later.p_value), notes)
 
 

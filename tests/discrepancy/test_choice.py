@@ -1,5 +1,6 @@
 """What is taken first, what stands beside its twins, and what is said of those that a fit was asked of."""
 
+import sys
 from types import SimpleNamespace
 
 import jax.numpy as jnp
@@ -15,8 +16,10 @@ from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.model import told
 from jaxsub.discrepancy.name import Named, named_on, refitted
 from jaxsub.discrepancy.selector import Selector
-from jaxsub.discrepancy.trial import Tries, alone
+from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone
+from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.whiteness import RANDOM
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.mechanisms import CoulombFriction
@@ -134,3 +137,62 @@ def test_a_twin_that_the_held_out_runs_refuse_gives_way_to_the_next():
     assert alone(tries, [0]) == {1: [(1, 20.0), (2, -np.inf)]}
     tries.stand = (0, 1)
     assert alone(tries, [0]) == {0: tries.fits}
+
+
+class Asked:
+    """Looks at recordings of which the answers are given, each a refusal or what stands; what was asked is counted."""
+
+    def __init__(self, monkeypatch, *answers):
+        self.answers, self.tried, self.without_name = [*answers], 0, 0
+        path = sys.modules["jaxsub.discrepancy.diagnose"]
+        fakes = {
+            "judge": lambda *_: Judged("named", [], 1e-9, []),
+            "worth_trying": lambda found, judged: [0] if self.answers else [],
+            "tried": self.try_one,
+            "unnamed": self.unnamed,
+            "weighed": lambda *_: self.found(),
+        }
+        for name, fake in fakes.items():
+            monkeypatch.setattr(path, name, fake)
+        self.explained = path.explained
+
+    def found(self):
+        found = object.__new__(Found)
+        parts = {"naming": SimpleNamespace(named=[0], again=False), "pattern": None, "memory": RANDOM}
+        for name, value in (parts | {"view": None, "selector": None}).items():
+            object.__setattr__(found, name, value)
+        return found
+
+    def try_one(self, trial, best, found, chosen, judged):
+        self.tried += 1
+        return best, self.answers.pop(0)
+
+    def unnamed(self, trial, best, found, judged):
+        self.without_name += 1
+        return best, judged
+
+    def answer(self):
+        trial = object.__new__(Trial)
+        object.__setattr__(trial, "progress", lambda message: None)
+        return self.explained(trial, Model(None, None, None, ()), self.found(), None)[1]
+
+
+def test_others_are_asked_where_all_that_was_named_is_refused(monkeypatch):
+    """Claim: what stands after a refusal is named, refusals and all; after three an unknown force is tried."""
+    refused = Judged("unknown", [], 1e-9, ["refused"])
+    damping = Named(0, QuadraticDamping("x", -0.5), 1.0, [], [])
+    asked = Asked(monkeypatch, refused, Judged("named", [damping], 1e-9, ["stands"]))
+    answer = asked.answer()
+    assert (answer.verdict, answer.named, answer.notes) == ("named", [damping], ["refused", "stands"])
+    assert (asked.tried, asked.without_name) == (2, 0)
+    asked = Asked(monkeypatch, *[refused] * 5)
+    assert asked.answer().verdict == "unknown"
+    assert (asked.tried, asked.without_name) == (3, 1)
+
+
+def test_what_is_beyond_doubt_stays_unknown_where_the_rest_says_nothing(monkeypatch):
+    """Claim: a mismatch whose only candidates were refused is not called none."""
+    nothing = Judged("none", [], 1.0, [])
+    asked = Asked(monkeypatch, Judged("unknown", [], 1e-9, ["refused"]), nothing)
+    answer = asked.answer()
+    assert (answer.verdict, answer.p_value, asked.without_name) == ("unknown", 1e-9, 1)
