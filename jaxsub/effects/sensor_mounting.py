@@ -49,10 +49,11 @@ class SensorMisalignment(_Mounting):
     epsilon: Array = amplitude("rad")
 
     def __check_init__(self):
-        pairs = set(zip(self.channels, self.sees.split(","), strict=False))
+        seen = self.sees.split(",")
         known = {(a, b) for triad in _TRIADS for a in triad for b in triad if a != b}
-        if self.sees.count(",") != self.channel.count(",") or not pairs <= known:
-            remedy = "name for each channel another axis of its triad, as channel = 'q,r' and sees = 'r,q'"
+        paired = len(seen) == len(self.channels) and set(zip(self.channels, seen, strict=True)) <= known
+        if not paired or (len(seen) > 1 and seen[::-1] != list(self.channels)):
+            remedy = "name for a channel another axis of its triad, for two each other: channel = 'q,r', sees = 'r,q'"
             raise InputError(self.label, f"{self.channel} cannot see {self.sees}", remedy)
 
     @classmethod

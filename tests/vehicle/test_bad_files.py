@@ -97,7 +97,9 @@ MISTAKES = {
     "effect of no channel": ('channel = "r"', 'channel = "p"', ": effects.*no channel p; use a channel of"),
     "arm that does not show": (BIAS, ARM, r": effects\[3\]: .*: no arm along x shows in r; one shows in u, "),
     "arm along no axis": (BIAS, ARM.replace('"x"', '"q"'), r": effects\[3\]: .*: no arm along q .*axis x, y or z"),
-    "axis of another sensor": (BIAS, TURNED, r": effects\[3\]: .*: r cannot see u; name for each channel another"),
+    "axis of another sensor": (BIAS, TURNED, r": effects\[3\]: .*: r cannot see u; name for a channel another"),
+    "axes of one sensor": (BIAS, TURNED.replace('"u"', '"p,q"'), r": effects\[3\]: .*: r cannot see p,q; name for a"),
+    "axes of three": (BIAS, TURNED.replace('"u"', '"q,r,p"').replace('"r"', '"p,q,r"'), ": .*p,q,r cannot see q,r,p; "),
     "effect twice": ('"sensor-bias"\nchannel = "r"', '"actuator-lag"\nactuator = "rudder"', r": effects\[3\].*twice; "),
 }  # fmt: skip
 RIG_MISTAKES = {
