@@ -30,7 +30,8 @@ def test_noise_is_that_of_the_seed_and_of_the_place_in_the_list():
     make = lambda seed, *samples: synthetic(vehicle, [inputs(vehicle, n) for n in samples], seed=seed)
     first, second = make(5, 40, 40)
     again = make(5, 40, 60)
-    np.testing.assert_array_equal(first.column("x"), again[0].column("x"))
+    # two shapes are two programs, which may round differently
+    np.testing.assert_allclose(first.column("x"), again[0].column("x"), rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(second.column("x")[:30], again[1].column("x")[:30], atol=0.1)
     assert not np.array_equal(first.column("x"), second.column("x"))
     assert not np.array_equal(first.column("x"), make(6, 40, 40)[0].column("x"))
