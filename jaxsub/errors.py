@@ -15,6 +15,12 @@ class InputError(ValueError):
     def __init__(self, where: str, what: str, remedy: str):
         # Library messages quoted in `what` may span lines; the contract with the user is one line.
         super().__init__(" ".join(f"{where}: {what}; {remedy}".split()))
+        self.parts = (where, what, remedy)
+
+    def within(self, place: str) -> "InputError":
+        """The same, of what `place` in a file describes."""
+        where, what, remedy = self.parts
+        return InputError(f"{place}: {where}", what, remedy)
 
 
 def require_known(kind: str, names: Iterable[str], known: Iterable[str], owner: str) -> None:

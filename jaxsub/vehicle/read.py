@@ -112,21 +112,21 @@ def _read_effects(
         kind = kinds[table.choice("effect", tuple(kinds))]
         chosen = {field.name.rstrip("_"): field for field in _option_fields(kind)}
         table.only(("effect", "expression", "parameters", *chosen))
-        given_options = {field.name: read_option(table, key, field.type) for key, field in chosen.items()}
+        place = f"{where}: effects[{number}]"
+        named = {field.name: read_option(table, key, field.type) for key, field in chosen.items()}
         try:
-            effect = kind(**given_options)
+            effect = kind(**named)
         except InputError as error:  # options that do not go together; it does not know the file
-            what, _, remedy = str(error).partition("; ")
-            raise InputError(f"{where}: effects[{number}]", what, remedy) from error
-        table_rows = _rows(effect, f"{where}: effects[{number}]")
+            raise error.within(place) from error
+        table_rows = _rows(effect, place)
         symbols = {symbol: field for field, symbol in effect.symbols().items()}
         given = table.table("parameters")
         given.only(tuple(symbols))
         values = {}
         for symbol, item in given.items():
             old = table_rows[symbols[symbol]]
-            place = f"{where}: effects[{number}].parameters.{symbol}"
-            values[symbols[symbol]], row = read_number(old.name, item, place, free=True, lower=old.lower, unit=old.unit)
+            at = f"{place}.parameters.{symbol}"
+            values[symbols[symbol]], row = read_number(old.name, item, at, free=True, lower=old.lower, unit=old.unit)
             table_rows[symbols[symbol]] = row
         effects.append(kind(**options(effect), **values))
         rows += list(table_rows.values())
