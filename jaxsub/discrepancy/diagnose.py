@@ -4,38 +4,30 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect, candidates, looked_at
+from ..effects import AbstractEffect, SmoothForce
 from ..errors import InputError
 from ..estimate import Fit, fit
-from ..likelihood import whitened
 from ..recording import Recording
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .advice import next_manoeuvre
 from .batch import batch
-from .columns import candidate_columns
 from .diagnosis import Diagnosis, Location, Physics, Rival
-from .evidence import Evidence
-from .generic import pattern
+from .explain import examine, explained
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
-from .name import MOST_EFFECTS, Named, Naming, name
+from .name import Named
 from .process_noise import noise_note, noise_signals
-from .programs import make_room
 from .progress import Progress
-from .selector import Selector
 from .show import channel_quality, coefficients, estimates, overlays, run_quality
-from .trial import Found, Model, Trial, tried, unnamed, worth_trying
-from .verdict import NOTHING, Judged, both, judge, summary
-from .view import View, facts, look
-from .whiteness import RANDOM, Memory, memory
+from .trial import Found, Model, Trial
+from .verdict import Judged, summary
+from .view import View, look
 
 # that a next manoeuvre is to tell from what was named
 _RIVALS = 2
 # and how many a page lists: the rest are less likely still
 _SHOWN = 4
-# times that others are asked where all that was named was refused
-_REFUSALS = 2
 
 
 def diagnose(
@@ -70,35 +62,6 @@ def diagnose(
     return _told(vehicle, train, held, found, field, baseline, best, judged)
 
 
-def explained(
-    trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
-) -> tuple[Model, Judged]:
-    """The best model, and what is to be said.
-
-    Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
-    they leave is not random: far from the truth a linear picture shows the largest alone. Where the held-out runs
-    refuse all that was named and the mismatch is beyond doubt, the rest of the vocabulary is asked.
-    """
-    best, judged, refusals = baseline, NOTHING, 0
-    while True:
-        said = judge(found.naming, found.pattern, found.memory)
-        chosen = worth_trying(found, said)
-        if chosen:
-            best, said = tried(trial, best, found, chosen, said)
-        judged = both(judged, said)
-        if chosen and said.verdict == "unknown" and not best.added and refusals < _REFUSALS:
-            refusals += 1
-            found = weighed(found.view, found.selector, trial.progress)
-            continue
-        if judged.verdict == "unknown" and not best.added:
-            # it stands for all that is missing, and not beside what was named
-            best, judged = unnamed(trial, best, found, judged)
-        whole = len(said.named) == len(found.naming.named) and not found.naming.again
-        if not said.named or (whole and not found.remains) or len(best.added) >= MOST_EFFECTS:
-            return best, judged
-        found = examine(best.view, vocabulary, trial.progress)
-
-
 def _told(
     vehicle: AbstractVehicle,
     train: Sequence[Recording],
@@ -115,12 +78,13 @@ def _told(
     improved = allowing_for(best.view, best.fit) if best.added else start
     where = _where(judged, first, field, train)
     physics = [_physics(named, improved) for named in judged.named]
+    nameless = [effect.equation for effect in best.added if isinstance(effect, SmoothForce)]
     models = [("baseline", before), *([("improved", after)] if best.added else [])]
     in_units = lambda rms: {c: value * float(s) for (c, value), s in zip(rms.items(), start.sigma, strict=True)}
     diagnosis = Diagnosis(
         verdict=judged.verdict,
         vehicle=layout.name,
-        summary=summary(judged.verdict, physics, where),
+        summary=summary(judged.verdict, physics, where, nameless),
         p_value=judged.p_value,
         where=where,
         physics=physics,
@@ -141,36 +105,6 @@ def _told(
         explanations=_explanations(judged, improved.vehicle),
     )
     return diagnosis, improved.vehicle
-
-
-def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
-    """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
-    make_room()
-    present = {effect.label for effect in view.vehicle.effects}
-    known = facts(view)
-    listed = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
-    columns, owners = candidate_columns(view, listed)
-    evidence = Evidence.of(view, columns)
-    return weighed(view, Selector(evidence, listed, owners, looked_at(known, vocabulary)), progress)
-
-
-def weighed(view: View, selector: Selector, progress: Progress) -> Found:
-    """What the candidates of a selector that are usable say, and a force without a name beside them."""
-    naming, evidence = name(selector, progress), selector.evidence
-    if naming.again:
-        return Found(view, selector, naming, None, RANDOM)
-    progress("looking for forces without a name")
-    bare = evidence.best([])[1]
-    under = [naming.products] if naming.products is bare else [bare, naming.products]
-    return Found(view, selector, naming, pattern(view, evidence, naming.columns, under), _memory(evidence, naming))
-
-
-def _memory(evidence: Evidence, naming: Naming) -> Memory:
-    """Whether what the named leave is random."""
-    products, system = naming.products, evidence.view.followed.system
-    white, _ = whitened(products.disturbance, system, evidence.left(naming.columns, products))
-    gain = 2.0 * (naming.value - evidence.best([])[0])
-    return memory(np.asarray(white)[..., 0], np.asarray(system.measured), gain)
 
 
 def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:

@@ -25,6 +25,8 @@ from .whiteness import Memory
 
 # times the errors that a force without a name leaves in a free run
 _MUCH_LESS = 4.0
+# of the log evidence that all of some candidates gain, from which one that gains so much alone is tried by itself first
+_NEARLY_ALL = 0.9
 # candidates by number with the log evidence of a fit
 Fits = list[tuple[int, float]]
 
@@ -151,16 +153,29 @@ def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
     return {}
 
 
+def leading(selector: Selector, chosen: Sequence[int]) -> list[int]:
+    """That one of `chosen`, if any, which alone gains nearly all that they gain together.
+
+    A linear picture is off by some of what the largest effect does, and that is what small ones beside it may be: they
+    are asked again from the model with the large one, which takes a fit and not one for every set of them.
+    """
+    before = selector.value([])
+    gains = {index: selector.value([index]) - before for index in chosen}
+    best = max(gains, key=lambda index: gains[index])
+    return [best] if gains[best] > _NEARLY_ALL * (selector.value(chosen) - before) else []
+
+
 def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
     """The model with those of `chosen` that stand on the held-out runs, and what is then to be said.
 
-    All together, or else the best that stands alone: where the model errs much, a linear
+    The one that leads, or all together, or else the best that stands alone: where the model errs much, a linear
     picture adds effects that only make up for each other, and one of them put into the model shows what is left.
     Where none does, those that were fitted are no candidates of `found` any more.
     """
     tries, effects = Tries(trial, base, found), found.selector.candidates
-    kept = together(tries, chosen) if len(chosen) > 1 else {}
-    kept = kept or alone(tries, chosen)
+    kept = alone(tries, leading(found.selector, chosen))
+    if not kept and len(chosen) > 1:
+        kept = together(tries, chosen) or alone(tries, chosen)
     refused = [index for index, gain in tries.said.items() if index not in kept and not gain.helps]
     for index in [*refused, *kept]:
         judged = helped(judged, effects[index], tries.said[index])

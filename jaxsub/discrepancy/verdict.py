@@ -98,8 +98,13 @@ def _certainty(named: Sequence[Named]) -> Verdict:
     return "named" if all(one.probability >= _CERTAIN for one in named) else "ambiguous"
 
 
-def summary(verdict: Verdict, physics: list[Physics], where: list[Location]) -> str:
-    """The verdict in one sentence."""
+def summary(verdict: Verdict, physics: list[Physics], where: list[Location], nameless: Sequence[str]) -> str:
+    """The verdict in a sentence, and one of the equations to which a force without a name was added."""
+    added = f" What has no name in {' and '.join(nameless)} is modelled by a smooth force." if nameless else ""
+    return _verdict_said(verdict, physics, where) + added
+
+
+def _verdict_said(verdict: Verdict, physics: list[Physics], where: list[Location]) -> str:
     places = " and ".join(place.where for place in where[:2]) or "no equation"
     names = ", then ".join(found.effect for found in physics)
     if verdict == "none":

@@ -1,0 +1,99 @@
+"""What the recordings ask for, tried and asked again until what is left is random, refused or without a name."""
+
+import numpy as np
+
+from ..effects import AbstractEffect, candidates, looked_at
+from ..likelihood import whitened
+from .columns import candidate_columns
+from .evidence import Evidence
+from .generic import pattern
+from .name import MOST_EFFECTS, Naming, name
+from .programs import make_room
+from .progress import Progress
+from .selector import Selector
+from .trial import Found, Model, Trial, tried, unnamed, worth_trying
+from .verdict import NOTHING, Judged, both, judge
+from .view import View, facts
+from .whiteness import RANDOM, Memory, memory
+
+# times that others are asked where all that was named was refused
+_REFUSALS = 2
+
+
+def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
+    """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
+    make_room()
+    present = {effect.label for effect in view.vehicle.effects}
+    known = facts(view)
+    listed = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
+    columns, owners = candidate_columns(view, listed)
+    evidence = Evidence.of(view, columns)
+    return weighed(view, Selector(evidence, listed, owners, looked_at(known, vocabulary)), progress)
+
+
+def weighed(view: View, selector: Selector, progress: Progress) -> Found:
+    """What the candidates of a selector that are usable say, and a force without a name beside them."""
+    naming, evidence = name(selector, progress), selector.evidence
+    if naming.again:
+        return Found(view, selector, naming, None, RANDOM)
+    progress("looking for forces without a name")
+    bare = evidence.best([])[1]
+    under = [naming.products] if naming.products is bare else [bare, naming.products]
+    return Found(view, selector, naming, pattern(view, evidence, naming.columns, under), _memory(evidence, naming))
+
+
+def _memory(evidence: Evidence, naming: Naming) -> Memory:
+    """Whether what the named leave is random."""
+    products, system = naming.products, evidence.view.followed.system
+    white, _ = whitened(products.disturbance, system, evidence.left(naming.columns, products))
+    gain = 2.0 * (naming.value - evidence.best([])[0])
+    return memory(np.asarray(white)[..., 0], np.asarray(system.measured), gain)
+
+
+def explained(
+    trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
+) -> tuple[Model, Judged]:
+    """The best model, and what is to be said.
+
+    Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
+    they leave is not random: far from the truth a linear picture shows the largest alone. Where the held-out runs
+    refuse all that was named and the mismatch is beyond doubt, the rest of the vocabulary is asked. What is left when
+    nothing more is named, and that the motion predicts, is modelled by a force without a name.
+    """
+    best, judged, refusals = baseline, NOTHING, 0
+    while True:
+        said, after = judge(found.naming, found.pattern, found.memory), None
+        chosen = worth_trying(found, said)
+        if chosen:
+            best, said = tried(trial, best, found, chosen, said)
+        else:
+            best, said, after = after_all(trial, best, found, said, vocabulary)
+        judged = both(judged, said)
+        if chosen and said.verdict == "unknown" and not best.added and refusals < _REFUSALS:
+            refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
+        if after is None and not said.named:
+            return unnamed(trial, best, found, judged)
+        whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.remains)
+        if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
+            return best, judged
+        found = after or examine(best.view, vocabulary, trial.progress)
+
+
+def after_all(
+    trial: Trial, base: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
+) -> tuple[Model, Judged, Found | None]:
+    """The model with a name that a force without one seemed to beat, what is to be said, and what is found from there.
+
+    Of the same equation, and if its fit leaves no such force; else all is as it was. Where a motion is no larger than
+    its noise, a linear picture along it gives the wrong shape to a force of a rate, which nothing then seems to have.
+    """
+    if found.pattern is None or not found.pattern.significant:
+        return base, judged, None
+    place = found.pattern.force.equation
+    here = [one.number for one in found.naming.named if place in one.effect.where]
+    best, said = tried(trial, base, found, here[:1], judged) if here else (base, judged)
+    if not said.named:
+        return base, judged, None
+    more = examine(best.view, vocabulary, trial.progress)
+    left = more.pattern is not None and more.pattern.significant and more.pattern.force.equation == place
+    return (base, judged, None) if left else (best, said, more)
