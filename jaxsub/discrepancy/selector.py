@@ -18,11 +18,13 @@ _ABSORBED = 1e-4
 # χ² from which a candidate may come to be chosen
 _LOOKED_AT = 10.0
 # shares of a free run's errors: a leader that explains so little gives way to one that explains so much
-_LITTLE, _MUCH = 0.02, 0.5
+_LITTLE, _MORE = 0.02, 0.2
+# and the share of what rules it
+_MUCH = 0.5
 # times the noise, from which squared errors of a free run are large
 _LARGE = 4.0
-# times the errors that a candidate leaves: what may stand in its place leaves no more
-_NO_MORE = 2.0
+# times the errors that a candidate leaves and explains: what may stand in its place leaves no more, explains no less
+_NO_MORE, _NO_LESS = 2.0, 0.5
 _STILL = 1e-6
 
 
@@ -127,7 +129,7 @@ class Selector:
         if share[best] > _LITTLE:
             return best
         p_values = [self.p_value(i, scan) for i in range(len(self.candidates))]
-        asked = (scan.value > self.value(chosen)) & (np.array(p_values) < SIGNIFICANCE) & (share > _MUCH)
+        asked = (scan.value > self.value(chosen)) & (np.array(p_values) < SIGNIFICANCE) & (share > _MORE)
         if not np.any(asked):
             return best
         best = int(np.argmax(np.where(asked, share, -np.inf)))
@@ -145,12 +147,13 @@ class Selector:
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate may stand where `index` does, on top of `chosen`.
 
-        Where a free run asked for it, those that leave much more of the free run's errors may not.
+        Where a free run asked for it, those that leave much more of the free run's errors may not, nor those that
+        explain much less.
         """
         if index not in self.freely:
             return np.ones(len(self.candidates), bool)
-        left = 1.0 - self.of_free_run(chosen)
-        return left <= _NO_MORE * left[index]
+        share = self.of_free_run(chosen)
+        return (1.0 - share <= _NO_MORE * (1.0 - share[index])) & (share >= _NO_LESS * share[index])
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
         """Whether `more` helps to predict parts of the recordings, or of a free run that asked, from the others."""

@@ -20,6 +20,8 @@ from .whiteness import record_sigma
 
 _WEAK, _OPEN = 0.5, 5.0
 _BLOCKS, _DRAWS = 24, 1999
+# of a free run, whose errors go together for longer
+_LONG_BLOCKS = 4
 # a free run's χ² may grow so much by chance
 _WORSE = 1.05
 _CHANCE = 0.05
@@ -30,14 +32,15 @@ class HeldOut:
     """A vehicle's free run through runs that its fit did not see: only their initial states were found.
 
     `predicted` and `error` are lists of (K, c) arrays in SI, a run each; `rms` is rms(error)/σ by channel.
-    `expected` are (K,) log likelihoods of each sample given those before it, a run each; `chi_square` is of all errors.
+    `expected` are (K,) log likelihoods of each sample given those before it, a run each; `squares` (K,) the squared
+    errors/σ of each, a run each.
     """
 
     predicted: list[np.ndarray]
     error: list[np.ndarray]
     rms: dict[str, float]
     expected: list[np.ndarray]
-    chi_square: float
+    squares: list[np.ndarray]
 
 
 def hold(
@@ -56,7 +59,7 @@ def hold(
         expected += list(np.asarray(_probable(disturbance, followed))[: len(batch)])
     whitened_error = np.stack(errors) / np.asarray(sigma)
     rms = channel_rms(jnp.asarray(whitened_error), runs.take(list(chosen), len(chosen)), vehicle.layout.channels)
-    return HeldOut(predicted, errors, rms, expected, float(np.sum(whitened_error**2)))
+    return HeldOut(predicted, errors, rms, expected, list(np.sum(whitened_error**2, axis=-1)))
 
 
 @eqx.filter_jit
@@ -73,31 +76,48 @@ class Luck(NamedTuple):
     **Fields**
 
     - `likelihood`: in log likelihood, each sample given those before it. `probability`: that this is luck.
-    - `free`: the ratio of a free run's χ², after to before. `sound`: whether physics admits the numbers of the fit.
+    - `free`: the ratio of a free run's χ², after to before; `free_probability`: that its fall is luck.
+    - `sound`: whether physics admits the numbers of the fit. `freely`: whether it was a free run that asked.
     """
 
     likelihood: float
     probability: float
     free: float
+    free_probability: float
     sound: bool
+    freely: bool
 
     @property
     def helps(self) -> bool:
-        """Whether what comes next is predicted better, soundly and not by luck, and a free run not worse."""
+        """Whether what comes next is predicted better, soundly and not by luck, and a free run not worse.
+
+        Where a free run asked, whether free runs err less, soundly and not by luck: what comes next is told by what
+        happens within a few samples.
+        """
+        if self.freely:
+            return self.sound and self.free_probability < _CHANCE
         return self.sound and self.likelihood > 0.0 and self.probability < _CHANCE and self.free < _WORSE
 
 
-def luck(before: HeldOut, after: HeldOut, sound: bool) -> Luck:
-    """The gain of held-out runs by a fit that is `sound` or not, and whether it is luck.
+def luck(before: HeldOut, after: HeldOut, sound: bool, *, freely: bool) -> Luck:
+    """The gain of held-out runs by a fit that is `sound` or not, of what a free run asked for or not."""
+    likelihood, probability = _gained(after.expected, before.expected, _BLOCKS)
+    _, free_probability = _gained(before.squares, after.squares, _LONG_BLOCKS)
+    total = lambda held: float(sum(squares.sum() for squares in held.squares))
+    free = total(after) / max(total(before), 1e-300)
+    return Luck(likelihood, probability, free, free_probability, sound, freely)
 
-    By a bootstrap over blocks of samples (Künsch 1989, Ann. Statist. 17): neighbouring samples' gains go together.
+
+def _gained(more: Sequence[np.ndarray], less: Sequence[np.ndarray], count: int) -> tuple[float, float]:
+    """The sum of differences of samples (K,) of every run, and the probability that it is above zero by luck.
+
+    By a bootstrap over blocks of samples (Künsch 1989, Ann. Statist. 17), `count` a run: neighbours go together.
     """
-    gains = [a - b for a, b in zip(after.expected, before.expected, strict=True)]
-    blocks = np.concatenate([[part.sum() for part in np.array_split(gain, _BLOCKS)] for gain in gains])
+    gains = [a - b for a, b in zip(more, less, strict=True)]
+    blocks = np.concatenate([[part.sum() for part in np.array_split(gain, count)] for gain in gains])
     rng = np.random.default_rng(0)
     drawn = rng.choice(blocks, (_DRAWS, len(blocks))).sum(axis=1)
-    probability = float((1 + np.sum(drawn <= 0.0)) / (1 + _DRAWS))
-    return Luck(float(blocks.sum()), probability, after.chi_square / max(before.chi_square, 1e-300), sound)
+    return float(blocks.sum()), float((1 + np.sum(drawn <= 0.0)) / (1 + _DRAWS))
 
 
 def overlays(

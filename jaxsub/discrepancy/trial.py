@@ -114,7 +114,8 @@ class Tries:
 
     def gain(self, fewer: Sequence[int], more: Sequence[int]) -> Luck:
         """What the held-out runs gain from the one set to the other."""
-        return luck(self.model(fewer).shown, self.model(more).shown, self.sound(more))
+        before, after = self.model(fewer).shown, self.model(more).shown
+        return luck(before, after, self.sound(more), freely=self.found.naming.again)
 
     def value(self, numbers: Sequence[int]) -> float:
         """Log evidence of the fit with these; minus infinity where they are not sound."""
@@ -209,5 +210,5 @@ def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Mo
         return base, judged
     force = found.pattern.force
     more = trial.with_effects(base, [force], found.naming.products.disturbance)
-    gain = luck(base.shown, more.shown, sound(more.fit, more.added))
+    gain = luck(base.shown, more.shown, sound(more.fit, more.added), freely=False)
     return (more if gain.helps else base), helped(judged, force, gain)

@@ -71,15 +71,19 @@ def judge(naming: Naming, pattern: Pattern | None, memory: Memory) -> Judged:
 
 def helped(judged: Judged, effect: AbstractEffect, gain: Luck) -> Judged:
     """The verdict once it is known what held-out runs gain by an effect."""
+    return dataclasses.replace(judged, notes=[*judged.notes, _gain_said(effect.label, gain)])
+
+
+def _gain_said(label: str, gain: Luck) -> str:
+    if gain.helps and gain.freely:
+        said = f"With {label} free runs through the held-out runs leave {gain.free:.0%} of their squared errors; "
+        return said + f"that this is luck has probability {gain.free_probability:.2g}."
     if gain.helps:
-        said = f"With {effect.label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
-        said += f"that this is luck has probability {gain.probability:.2g}."
-        return dataclasses.replace(judged, notes=[*judged.notes, said])
-    why = (
-        "the held-out runs worse" if gain.sound else "with numbers that physics does not admit or the runs do not tell"
-    )
-    said = f"{effect.label} fitted the training runs better but {why}, and is not accepted."
-    return dataclasses.replace(judged, notes=[*judged.notes, said])
+        said = f"With {label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
+        return said + f"that this is luck has probability {gain.probability:.2g}."
+    worse = "the held-out runs worse"
+    why = worse if gain.sound else "with numbers that physics does not admit or the runs do not tell"
+    return f"{label} fitted the training runs better but {why}, and is not accepted."
 
 
 def settled(judged: Judged, stand: list[Named]) -> Judged:

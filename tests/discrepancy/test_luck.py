@@ -1,0 +1,40 @@
+"""Whether what held-out runs gain is more than luck."""
+
+import numpy as np
+import pytest
+
+from jaxsub.discrepancy.show import HeldOut, luck
+
+
+def shown(expected: np.ndarray, squares: np.ndarray) -> HeldOut:
+    """Two held-out runs with the same log likelihoods and squared errors of each sample."""
+    return HeldOut([], [], {}, [expected] * 2, [squares] * 2)
+
+
+NOTHING = shown(np.zeros(480), np.ones(480))
+
+
+def test_a_gain_everywhere_helps_and_one_in_a_single_place_is_luck():
+    """Claim: the same log likelihood counts where it is gained all along and not where it is gained at once."""
+    at_once = np.zeros(480)
+    at_once[7] = 48.0
+    helps = lambda expected: luck(NOTHING, shown(expected, np.ones(480)), True, freely=False)
+    assert helps(np.full(480, 0.1)).helps
+    assert not helps(at_once).helps
+    assert helps(at_once).likelihood == pytest.approx(helps(np.full(480, 0.1)).likelihood)
+    assert not luck(NOTHING, shown(np.full(480, 0.1), np.full(480, 1.1)), True, freely=False).helps
+    assert not luck(NOTHING, shown(np.full(480, 0.1), np.ones(480)), False, freely=False).helps
+
+
+def test_where_a_free_run_asked_a_free_run_judges():
+    """Claim: half the squared errors stand though samples come less expected; not where they fall in one place."""
+    outlier = np.full(480, 0.05)
+    outlier[3] = -100.0
+    half, once = np.full(480, 0.5), np.ones(480)
+    once[:60] = 0.0
+    judged = lambda expected, squares: luck(NOTHING, shown(expected, squares), True, freely=True)
+    assert judged(outlier, half).helps
+    assert judged(outlier, half).free == pytest.approx(0.5)
+    assert not luck(NOTHING, shown(outlier, half), True, freely=False).helps
+    assert not judged(outlier, once + np.where(np.arange(480) < 60, 0.0, 0.05)).helps
+    assert not luck(NOTHING, shown(outlier, half), False, freely=True).helps
