@@ -105,9 +105,11 @@ def whole(out: Path, quick: bool) -> dict:
                 command, env=environment, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
             )
             verdict = json.loads((folder / label / "diagnosis.json").read_text())
+            making = json.loads(told.stdout.splitlines()[-1])
             results[label] = {
                 "seconds": time.perf_counter() - begin,
-                "making_programs_s": json.loads(told.stdout.splitlines()[-1]),
+                "programs": int(making.pop("programs")),
+                "making_programs_s": making,
                 "verdict": verdict["verdict"],
                 "physics": [found["effect"] for found in verdict["physics"]],
             }

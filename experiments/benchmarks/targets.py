@@ -31,8 +31,7 @@ def judged(found: Mapping[str, dict]) -> dict[str, dict]:
         row("forward Jacobian of 25 coefficients, in simulations", ratio, 4.0, more=False)
     if "diagnose" in found:
         for label, aim in (("cold", 20.0), ("warm", 3.0)):
-            making = found["diagnose"][label]["making_programs_s"]
-            seconds = sum(making[part] for part in ("trace", "lower", "compile_or_read"))
+            seconds = sum(found["diagnose"][label]["making_programs_s"].values())
             row(f"making the programs of a diagnosis, {label}, s", seconds, aim, more=False)
     for what in ("samples", "batch", "candidates"):
         if "growth" in found:
