@@ -53,7 +53,8 @@ def on_cluster(plan: Plan, chunks: Sequence[Chunk], address: str) -> Iterator[tu
         client.register_plugin(plugin)
         # all at once, so that a cluster that grows with its work sees how much there is
         submitted = [client.submit(run_there, plugin.name, chunk, pure=False) for chunk in chunks]
-        for future in distributed.as_completed(submitted):
+        # it would ask the default client for its loop, which this is not
+        for future in distributed.as_completed(submitted, loop=client.loop):
             yield future.result()
             future.release()
         client.unregister_worker_plugin(plugin.name)

@@ -35,7 +35,8 @@ class Killer(threading.Thread):
         self.cluster, self.kept, self.done_then, self.at = cluster, threading.Event(), None, ()
 
     def run(self):
-        with distributed.Client(self.cluster) as client:
+        # a default client would serve the sweep too
+        with distributed.Client(self.cluster, set_as_default=False) as client:
             pids = client.run(os.getpid)
             while not self.at:
                 time.sleep(0.02)
