@@ -205,10 +205,14 @@ def worth_trying(found: Found, judged: Judged) -> list[int]:
 
 
 def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
-    """The model with the force without a name, if it stands on the held-out runs."""
+    """The model with the force without a name, if it stands on the held-out runs and leaves what was named its numbers.
+
+    A smooth force of a rate holds friction and damping as well: beside it the runs would not tell them any more.
+    """
     if found.pattern is None or not found.pattern.joins:
         return base, judged
     force = found.pattern.force
     more = trial.with_effects(base, [force], found.naming.products.disturbance)
-    gain = luck(base.shown, more.shown, sound(more.fit, more.added), freely=False)
+    good = sound(more.fit, more.added) and told(more.view, base.added)
+    gain = luck(base.shown, more.shown, good, freely=False)
     return (more if gain.helps else base), helped(judged, force, gain)

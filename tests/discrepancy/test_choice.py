@@ -17,7 +17,8 @@ from jaxsub.discrepancy.explain import after_all
 from jaxsub.discrepancy.model import told
 from jaxsub.discrepancy.name import Named, named_on, refitted
 from jaxsub.discrepancy.selector import Scan, Selector
-from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading
+from jaxsub.discrepancy.show import Luck
+from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, unnamed
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM
@@ -277,3 +278,22 @@ def test_only_what_explains_as_much_of_a_free_run_stands_in_for_what_it_asked_fo
     asked = Freely(0.9, 0.7, 0.85)
     asked.freely.add(0)
     assert asked.stand_in([], 0).tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_a_force_without_a_name_leaves_what_was_named_its_numbers(monkeypatch, apart):
+    """Claim: beside a named effect it joins where the recordings still tell that effect, and else does not."""
+    friction, force = CoulombFriction("x", 0.01), QuadraticDamping("x", -0.5)
+    base, more = Model(None, None, None, (friction,)), Model(None, None, None, (friction, force))
+    monkeypatch.setattr(Trial, "with_effects", lambda *_: more)
+    path = sys.modules["jaxsub.discrepancy.trial"]
+    asked = []
+    monkeypatch.setattr(path, "sound", lambda fit, effects: True)
+    monkeypatch.setattr(path, "told", lambda view, effects: asked.append(effects) is None and apart)
+    monkeypatch.setattr(path, "luck", lambda *given, freely: Luck(9.0, 0.001, 0.5, 0.001, given[2], freely))
+    naming = SimpleNamespace(products=SimpleNamespace(disturbance=None))
+    found = looked(naming, SimpleNamespace(joins=True, force=force))
+    best, said = unnamed(silent(), base, found, Judged("named", [], 1e-9, []))
+    assert asked == [(friction,)]
+    assert best is (more if apart else base)
+    assert ("gain" in said.notes[0]) is apart
