@@ -13,7 +13,7 @@ from ..likelihood import Disturbance
 from ..recording.runs import Runs
 from .evidence import evidence_of
 from .generic import Pattern, most_explained
-from .model import join, sound, told
+from .model import allowing_for, join, sound, told
 from .name import Naming, named_on, refitted, standing
 from .programs import make_room
 from .progress import Progress
@@ -27,6 +27,8 @@ from .whiteness import Memory
 _MUCH_LESS = 4.0
 # of the log evidence that all of some candidates gain, from which one that gains so much alone is tried by itself first
 _NEARLY_ALL = 0.9
+# times a standard error, to which it may grow by a force without a name
+_ABOUT = 2.0
 # candidates by number with the log evidence of a fit
 Fits = list[tuple[int, float]]
 
@@ -204,6 +206,13 @@ def worth_trying(found: Found, judged: Judged) -> list[int]:
     return [ruling] if left < _MUCH_LESS * (1.0 - most_explained(found.view, selector.free.disturbance)) else []
 
 
+def as_well_known(base: Model, more: Model) -> bool:
+    """Whether the numbers of what was added to `base` are known about as well in `more`, disturbances allowed for."""
+    before, after = (allowing_for(model.view, model.fit).standard_errors for model in (base, more))
+    own = [f"{effect.label}.{symbol}" for effect in base.added for symbol in effect.symbols().values()]
+    return all(after[name] < _ABOUT * before[name] for name in own)
+
+
 def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
     """The model with the force without a name, if it stands on the held-out runs and leaves what was named its numbers.
 
@@ -213,6 +222,6 @@ def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Mo
         return base, judged
     force = found.pattern.force
     more = trial.with_effects(base, [force], found.naming.products.disturbance)
-    good = sound(more.fit, more.added) and told(more.view, base.added)
+    good = sound(more.fit, more.added) and as_well_known(base, more)
     gain = luck(base.shown, more.shown, good, freely=False)
     return (more if gain.helps else base), helped(judged, force, gain)

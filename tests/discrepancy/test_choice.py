@@ -280,20 +280,20 @@ def test_only_what_explains_as_much_of_a_free_run_stands_in_for_what_it_asked_fo
     assert asked.stand_in([], 0).tolist() == [True, False, True]
 
 
-@pytest.mark.parametrize("apart", [True, False])
-def test_a_force_without_a_name_leaves_what_was_named_its_numbers(monkeypatch, apart):
-    """Claim: beside a named effect it joins where the recordings still tell that effect, and else does not."""
+@pytest.mark.parametrize(("error", "joins"), [(0.015, True), (0.5, False)])
+def test_a_force_without_a_name_leaves_what_was_named_its_numbers(monkeypatch, error, joins):
+    """Claim: beside friction it joins where friction's error hardly grows, and not where it trades with it."""
     friction, force = CoulombFriction("x", 0.01), QuadraticDamping("x", -0.5)
-    base, more = Model(None, None, None, (friction,)), Model(None, None, None, (friction, force))
+    errors = {"coulomb-friction[x].F_c": 0.01, "coulomb-friction[x].F_0": 0.01}
+    base, more = Model(0, None, None, (friction,)), Model(1, None, None, (friction, force))
+    found_errors = [errors, errors | {"coulomb-friction[x].F_0": error, "quadratic-damping[x].X_xx": 9.0}]
     monkeypatch.setattr(Trial, "with_effects", lambda *_: more)
     path = sys.modules["jaxsub.discrepancy.trial"]
-    asked = []
+    monkeypatch.setattr(path, "allowing_for", lambda view, fit: SimpleNamespace(standard_errors=found_errors[fit]))
     monkeypatch.setattr(path, "sound", lambda fit, effects: True)
-    monkeypatch.setattr(path, "told", lambda view, effects: asked.append(effects) is None and apart)
     monkeypatch.setattr(path, "luck", lambda *given, freely: Luck(9.0, 0.001, 0.5, 0.001, given[2], freely))
     naming = SimpleNamespace(products=SimpleNamespace(disturbance=None))
     found = looked(naming, SimpleNamespace(joins=True, force=force))
     best, said = unnamed(silent(), base, found, Judged("named", [], 1e-9, []))
-    assert asked == [(friction,)]
-    assert best is (more if apart else base)
-    assert ("gain" in said.notes[0]) is apart
+    assert best is (more if joins else base)
+    assert ("gain" in said.notes[0]) is joins
