@@ -115,10 +115,9 @@ def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording
     if judged.named:
         effects = [named.effect for named in judged.named]
         share = effect_shares(view, effects, found.naming.products.disturbance)
-    elif found.pattern is not None and found.pattern.significant:
-        own = found.pattern.force.equation
+    elif found.nameless is not None:
         share = {place: 0.5 * part for place, part in share.items()}
-        share[own] = share.get(own, 0.0) + 0.5
+        share[found.nameless] = share.get(found.nameless, 0.0) + 0.5
     return locations(field, view, train, share)
 
 

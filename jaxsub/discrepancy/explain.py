@@ -87,13 +87,9 @@ def after_all(
     Of the same equation, and if its fit leaves no such force; else all is as it was. Where a motion is no larger than
     its noise, a linear picture along it gives the wrong shape to a force of a rate, which nothing then seems to have.
     """
-    if found.pattern is None or not found.pattern.significant:
-        return base, judged, None
-    place = found.pattern.force.equation
-    here = [one.number for one in found.naming.named if place in one.effect.where]
+    here = [one.number for one in found.naming.named if found.nameless in one.effect.where]
     best, said = tried(trial, base, found, here[:1], judged) if here else (base, judged)
     if not said.named:
         return base, judged, None
     more = examine(best.view, vocabulary, trial.progress)
-    left = more.pattern is not None and more.pattern.significant and more.pattern.force.equation == place
-    return (base, judged, None) if left else (best, said, more)
+    return (base, judged, None) if more.nameless == found.nameless else (best, said, more)

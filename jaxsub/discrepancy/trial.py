@@ -49,7 +49,12 @@ class Found:
     @property
     def remains(self) -> bool:
         """Whether there is something beside what was named."""
-        return self.memory.correlated or (self.pattern is not None and self.pattern.significant)
+        return self.memory.correlated or self.nameless is not None
+
+    @property
+    def nameless(self) -> str | None:
+        """The equation of the force without a name, if it is there."""
+        return self.pattern.force.equation if self.pattern is not None and self.pattern.significant else None
 
 
 class Model(NamedTuple):
@@ -222,6 +227,6 @@ def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Mo
         return base, judged
     force = found.pattern.force
     more = trial.with_effects(base, [force], found.naming.products.disturbance)
-    good = sound(more.fit, more.added) and as_well_known(base, more)
+    good = sound(more.fit, more.added) and (not base.added or as_well_known(base, more))
     gain = luck(base.shown, more.shown, good, freely=False)
     return (more if gain.helps else base), helped(judged, force, gain)

@@ -237,8 +237,13 @@ def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monk
     base, better = Model(None, None, None, ()), Model(None, None, None, (roll.effect,))
     unknown, named = Judged("unknown", [], 1e-9, []), Judged("named", [roll], 1e-9, [])
     asked, after = [], seen(left_in)
+
+    def stand(trial, base, found, chosen, judged):
+        asked.append(chosen)
+        return better, named
+
     path = sys.modules["jaxsub.discrepancy.explain"]
-    monkeypatch.setattr(path, "tried", lambda *given: (better, named) if asked.append(given[3]) is None else None)
+    monkeypatch.setattr(path, "tried", stand)
     monkeypatch.setattr(path, "examine", lambda *_: after)
     trial = silent()
     found = after_all(trial, base, seen("roll", yaw, roll), unknown, None)
