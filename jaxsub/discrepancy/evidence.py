@@ -22,7 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import FROM_NEAR, estimate_disturbance
+from ..estimate import estimate_disturbance
 from ..likelihood import Columns, Disturbance, System, part_products
 from .columns import force_columns
 from .view import View, lengths
@@ -190,7 +190,7 @@ class Evidence:
         samples = float(np.sum(np.asarray(self.view.followed.system.measured)))
         worth = jnp.where(filled, 1.0 / samples, 1.0)
         prior = jax.scipy.linalg.block_diag(self.view.prior, jnp.diag(worth))
-        found = estimate_disturbance(self.view.followed.system, self.view.base + picked, prior, start, FROM_NEAR)
+        found = estimate_disturbance(self.view.followed.system, self.view.base + picked, prior, start)
         return self.under(found)
 
     def left(self, chosen: Sequence[int], products: Products) -> Columns:

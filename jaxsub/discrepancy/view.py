@@ -1,7 +1,7 @@
 """A fitted model as a filter of it follows its recordings: what every question about left-out physics is asked of."""
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import cached_property
 
 import equinox as eqx
@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..effects import Facts, Motion, wave_band
-from ..estimate import FROM_AFAR, FROM_NEAR, Fit, Problem, estimate_disturbance
+from ..estimate import Fit, Problem, estimate_disturbance
 from ..likelihood import (
     Columns,
     Disturbance,
@@ -117,9 +117,10 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     The search for the disturbance starts from what the residuals ask, or from the given one where that is better: after
     a fit that explains more, it is far too large, and numbers that are moved under it are lost.
 
-    Where a fit leaves much, the best of several searches is taken. Numbers are moved from those of the fit and from
-    those of the `file`: a fit that has to do without the physics may end where nothing leads back. And what is left is
-    put down to forces at first, or to sensors: forces that follow a sensor which is wrong make the right ones wrong.
+    Where a fit leaves much, several searches are begun and the better half goes on after each turn. Numbers are moved
+    from those of the fit and from those of the `file`: a fit that has to do without the physics may end where nothing
+    leads back. And what is left is put down to forces at first, or to sensors: forces that follow a sensor which is
+    wrong make the right ones wrong.
     """
     led = _Led(fit, fit.problem)
     system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
@@ -128,32 +129,32 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     if max(fit.rms.values()) > _MUCH:
         vehicles += [file] if file is not None else []
         starts.append([_in_sensors(guess, fit)])
-    first, rest = (FROM_AFAR, FROM_NEAR), [FROM_NEAR] * (_TURNS - 2)
-    at = _settled(led, _best(_settled(led, _begun(led, v, some), first) for v in vehicles for some in starts), rest)
+    searches = [_by_cost(led.at(v, start) for start in some)[0] for v in vehicles for some in starts]
+    while len(searches) > 1:
+        searches = _by_cost(_turned(led, at) for at in searches)[: len(searches) // 2]
+    at = _settled(led, searches[0])
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     gram, _ = products(at.disturbance, at.followed.system, at.base, at.prior)
     covariance = np.linalg.inv(np.asarray(gram)[1:, 1:]) / np.outer(at.length, at.length)
     return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
-def _best(found: Iterable["_At"]) -> "_At":
-    return min(found, key=lambda at: at.cost if np.isfinite(at.cost) else np.inf)
+def _by_cost(found: Iterable["_At"]) -> list["_At"]:
+    return sorted(found, key=lambda at: at.cost if np.isfinite(at.cost) else np.inf)
 
 
-def _begun(led: "_Led", vehicle: AbstractVehicle, starts: Sequence[Disturbance]) -> "_At":
-    """A vehicle led under the best of some disturbances."""
-    return _best(led.at(vehicle, start) for start in starts)
+def _turned(led: "_Led", at: "_At") -> "_At":
+    """The disturbance sought for the numbers, and the numbers under it."""
+    found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance)
+    return led.descend(at.vehicle, found)
 
 
-def _settled(led: "_Led", at: "_At", turns: Sequence[int]) -> "_At":
-    """The disturbance and the numbers, sought in `turns` of so many steps each, until they stay."""
-    before = at.cost
-    for steps in turns:
-        found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance, steps)
-        at = led.descend(at.vehicle, found)
-        if abs(before - at.cost) < _SETTLED:
+def _settled(led: "_Led", at: "_At") -> "_At":
+    """Both, in turns until they stay."""
+    for _ in range(_TURNS):
+        before, at = at, _turned(led, at)
+        if abs(before.cost - at.cost) < _SETTLED:
             break
-        before = at.cost
     return at
 
 

@@ -1,7 +1,7 @@
 """Estimation: one `fit`, one `Fit`, and the methods that may do it."""
 
 from .combined import Chain, Global
-from .disturbance import FROM_AFAR, FROM_NEAR, estimate_disturbance
+from .disturbance import estimate_disturbance
 from .ends import Ends, ends
 from .filtered import Filtered
 from .fit import Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
@@ -12,8 +12,6 @@ from .problem import Expansion, Problem, initial_guess
 from .starts import MARGIN, Basin, Rate, basins, scattered, scattered_by_number, success
 
 __all__ = [
-    "FROM_AFAR",
-    "FROM_NEAR",
     "MARGIN",
     "METHODS",
     "AbstractMethod",

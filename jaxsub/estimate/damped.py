@@ -45,6 +45,8 @@ class Damped(optx.AbstractMinimiser):
 
     expand: Callable[[Any, Array], Expansion] = eqx.field(static=True)
     tolerance: float = eqx.field(static=True)
+    # largest change of an entry in one step
+    longest: float = eqx.field(static=True, default=float("inf"))
     # what optimistix asks every solver for and this one has no use of
     rtol: ClassVar[float] = 0.0
     atol: ClassVar[float] = 0.0
@@ -67,7 +69,7 @@ class Damped(optx.AbstractMinimiser):
         shrink = jnp.maximum(1.0 / 3.0, 1.0 - (2.0 * jnp.minimum(gain, 1.0) - 1.0) ** 3)
         factor = jnp.where(state.fresh, 1.0, chosen(shrink, state.growth))
         damping = jnp.maximum(_LEAST, state.damping * factor)
-        step, promised, decrement = _step(at, damping)
+        step, promised, decrement = _step(at, damping, self.longest)
         y = chosen(state.trial, y)
         # a start that does not run gives nothing to go by, and ends the search
         decrement = jnp.where(state.fresh & ~finite, jnp.nan, decrement)
@@ -90,13 +92,14 @@ class Damped(optx.AbstractMinimiser):
         return y, aux, {}
 
 
-def _step(at: Expansion, damping: Array) -> tuple[Array, Array, Array]:
+def _step(at: Expansion, damping: Array, longest: float) -> tuple[Array, Array, Array]:
     """The step, what its quadratic model promises to gain, and what the full step would."""
     diagonal = jnp.abs(jnp.diag(at.hessian))
     size = jnp.where(diagonal > 0.0, jnp.sqrt(diagonal), 1.0)
     values, vectors = jnp.linalg.eigh(at.hessian / jnp.outer(size, size))
     gradient = vectors.T @ (at.gradient / size)
     move = -gradient / (jnp.abs(values) + damping)
+    move = move * jnp.minimum(1.0, longest / jnp.max(jnp.abs(vectors @ move / size)))
     promised = -jnp.sum(move * (gradient + 0.5 * jnp.abs(values) * move))
     told = jnp.abs(values) > _FLAT * jnp.max(jnp.abs(values), initial=0.0)
     full = 0.5 * jnp.sum(jnp.where(told, gradient**2 / jnp.where(told, jnp.abs(values), 1.0), 0.0))

@@ -1,38 +1,93 @@
-"""The disturbance of largest restricted likelihood."""
+r"""The disturbance of largest restricted likelihood, by scoring with the average information.
+
+With V the covariance of the residual e, P what $V^{-1}$ leaves once the columns are fitted and $V_i$ the derivative of
+V by a parameter, the Hessian of minus the log restricted likelihood is $\tfrac12\mathrm{tr}\,PV_iPV_j$ averaged over
+recordings. $\tfrac12e^TPV_iPV_jPe$ has that average too and needs no trace (Gilmour, Thompson and Cullis 1995,
+Biometrics 51): a filter whitens the columns $V_iPe$ beside the others. Pe is the likelihood's own gradient by the
+residual and $V_iPe$ a pass back and one forth, so a step costs less than two gradients, and ten of them lead where a
+quasi-Newton search needs a hundred.
+"""
+
+from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from ..likelihood import Columns, Disturbance, System, restricted
+from ..likelihood import Columns, Disturbance, System, covariance_derivatives, products, restricted
+from .damped import Damped
+from .problem import Expansion
 
-# from nothing known, and from a disturbance that is near: a step more would gain less than the likelihood is read to
-FROM_AFAR, FROM_NEAR = 25, 10
+_STEPS = 10
+# a gain of log likelihood that nothing depends on
+_ENOUGH = 0.1
 # standard deviations of weak priors on the logarithms of q, τ and κ: without them an absent force has no optimum
 _LOOSE = (5.0, 1.5, 2.0)
-# as well as some minutes of a force tell log q and log τ; the search is in such units
-_TOLD = (0.1, 0.2)
+# of those logarithms: beyond, curvature says nothing
+_FARTHEST = 2.0
+# columns are filled up to a multiple of this many, so that models of several sizes share a program
+_SIDE_BY_SIDE = 8
 
 
-@eqx.filter_jit
+class _Given(NamedTuple):
+    system: System
+    columns: Columns
+    prior: Array
+    centre: Array
+
+
 def estimate_disturbance(
-    system: System, columns: Columns, prior: Float[Array, "p1 p1"], start: Disturbance, steps: int
+    system: System, columns: Columns, prior: Float[Array, "p1 p1"], start: Disturbance
 ) -> Disturbance:
-    """The disturbance of largest restricted likelihood, to a part of a natural unit, within so many `steps` of `start`.
+    """The disturbance of largest restricted likelihood, or a better one than `start` where that is far from it.
 
     The first of the `columns` is the residual; `prior` as for `restricted`.
     """
-    n, c = len(start.force), len(start.noise)
-    by_part = lambda force, time, noise: jnp.concatenate([jnp.full(n, force), jnp.full(n, time), jnp.full(c, noise)])
-    samples = jnp.maximum(jnp.sum(system.measured), 1)
-    unit = by_part(*_TOLD, jnp.sqrt(c / (2.0 * samples)))
+    known = len(prior)
+    whole = -(-known // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
+    filled = jax.tree.map(lambda M: jnp.pad(M, [(0, 0)] * 3 + [(0, whole - known)]), columns)
+    return _search(system, filled, jnp.eye(whole).at[:known, :known].set(prior), start)
+
+
+@eqx.filter_jit
+def _search(system: System, columns: Columns, prior: Array, start: Disturbance) -> Disturbance:
     centre = jnp.log(jnp.concatenate([start.force, start.time, start.noise]))
-    loose = by_part(*_LOOSE)
-    parts = lambda y: Disturbance(*jnp.split(jnp.exp(centre + unit * y), [n, 2 * n]))
+    given = _Given(system, columns, prior, centre)
+    solver = Damped(_expand, _ENOUGH, _FARTHEST)
+    return _parts(given, optx.minimise(_cost, solver, centre, given, max_steps=_STEPS, throw=False).value)
 
-    def cost(y: Array, given: tuple[System, Columns, Array]) -> Array:
-        return restricted(parts(y), *given) + 0.5 * jnp.sum((unit * y / loose) ** 2)
 
-    solver, given = optx.BFGS(rtol=1e-4, atol=0.1), (system, columns, prior)
-    return parts(optx.minimise(cost, solver, jnp.zeros(2 * n + c), given, max_steps=steps, throw=False).value)
+def _parts(given: _Given, y: Array) -> Disturbance:
+    n = given.system.G.shape[3] // 2
+    return Disturbance(*jnp.split(jnp.exp(y), [n, 2 * n]))
+
+
+def _loose(system: System) -> Array:
+    n, c = system.G.shape[3] // 2, system.C.shape[2]
+    return jnp.repeat(jnp.asarray(_LOOSE), jnp.asarray([n, n, c]), total_repeat_length=2 * n + c)
+
+
+def _cost(y: Array, given: _Given) -> Array:
+    away = (y - given.centre) / _loose(given.system)
+    return restricted(_parts(given, y), given.system, given.columns, given.prior) + 0.5 * jnp.sum(away**2)
+
+
+def _expand(given: _Given, y: Array) -> Expansion:
+    """The cost to second order, with the average information for its curvature."""
+    system, columns, prior = given.system, given.columns, given.prior
+
+    def of(y: Array, residual: Array) -> Array:
+        shown = columns.shown.at[..., 0].set(residual)
+        return _cost(y, given._replace(columns=Columns(shown, columns.forcing)))
+
+    cost, (gradient, error) = jax.value_and_grad(of, argnums=(0, 1))(y, columns.shown[..., 0])
+    by = covariance_derivatives(_parts(given, y), system, error)
+    unforced = None if columns.forcing is None else jnp.zeros((*columns.forcing.shape[:-1], y.size), y.dtype)
+    bordered = jax.scipy.linalg.block_diag(prior, jnp.zeros((y.size, y.size), y.dtype))
+    gram, _ = products(_parts(given, y), system, columns + Columns(by, unforced), bordered)
+    known = len(prior)
+    fitted, across, own = gram[1:known, 1:known], gram[1:known, known:], gram[known:, known:]
+    information = 0.5 * (own - across.T @ jnp.linalg.solve(fitted, across))
+    return Expansion(cost, gradient, information + jnp.diag(_loose(system) ** -2.0))

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import FROM_AFAR, Fit, Problem, estimate_disturbance
+from ..estimate import Fit, Problem, estimate_disturbance
 from ..likelihood import (
     Columns,
     Disturbance,
@@ -79,7 +79,7 @@ def _corrected(
     system = System.of(model, problem.runs, problem.sigma, problem.spread)
     columns = Columns(jnp.concatenate([residual[..., None], theta @ basis], axis=-1))
     if disturbance is None:
-        disturbance = estimate_disturbance(system, columns, prior, first_guess(system, residual), FROM_AFAR)
+        disturbance = estimate_disturbance(system, columns, prior, first_guess(system, residual))
     # D = basis basisᵀ, so that white noise alone gives D back
     middle = basis.T @ (carried(disturbance, system, left) + pinned) @ basis
     return basis @ middle @ basis.T + untold @ untold.T, disturbance

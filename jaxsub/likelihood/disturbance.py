@@ -179,24 +179,66 @@ def carried(disturbance: Disturbance, system: System, weights: Float[Array, "r k
 
     By the adjoint recursion, one pass backwards through each run, instead of a sum over all pairs of samples.
     """
+    asked = _asked(system, weights)
+    forces = disturbance.force[:, None] ** 2 * _correlated(disturbance.time, system.intervals, asked)
+    white = jnp.where(system.measured, disturbance.noise, 1.0)[..., None] * weights
+    return jnp.einsum("rknp,rknq->pq", asked, forces) + jnp.einsum("rkcp,rkcq->pq", white, white)
 
-    def run(F: Array, B: Array, C: Array, measured: Array, W: Array) -> Array:
-        s = C.shape[-1]
-        shown = jnp.einsum("kcs,kcp->ksp", C, W)
 
-        def back(adjoint: Array, step: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            F, B, shown = step
-            return (F.T @ adjoint).at[:s].add(shown), B.T @ adjoint
+def covariance_derivatives(
+    disturbance: Disturbance, system: System, weights: Float[Array, "r k c"]
+) -> Float[Array, "r k c m"]:
+    r"""$\Gamma_i W$ with $\Gamma_i$ the derivatives of the residuals' covariance by log q, log τ and log κ, in order.
 
-        last = jnp.zeros((F.shape[1], W.shape[-1])).at[:s].set(shown[-1])
-        first, pushes = jax.lax.scan(back, last, (F, B, shown[:-1]), reverse=True)
-        begun = disturbance.force[:, None] * first[s:]
-        white = jnp.where(measured, disturbance.noise, 1.0)[..., None] * W
-        gram = lambda columns: jnp.einsum("...a,...b->ab", columns, columns)
-        return gram(pushes) + gram(begun) + gram(white)
+    A pass backwards for the forces that `weights` ask for, and one forwards for what each force, correlated, shows.
+    """
+    asked = _asked(system, weights[..., None])
+    kept = lambda log_time: _correlated(jnp.exp(log_time), system.intervals, asked)[..., 0]
+    log_time = jnp.log(disturbance.time)
+    # each force depends on its own time constant alone
+    by = jax.jvp(kept, (log_time,), (jnp.ones_like(log_time),))
+    n, s = len(disturbance.force), system.A.shape[-1]
+    forces = jnp.concatenate([2.0 * by[0], by[1]], axis=-1) * jnp.tile(disturbance.force**2, 2)
+    both = lambda M: jnp.tile(M, 2)
+    forcing = both(system.G[..., :n]) * forces[:, :-1, None] + both(system.G[..., n:]) * forces[:, 1:, None]
+    shown = system.C @ propagate(system.A, forcing, jnp.zeros((len(forcing), s, 2 * n), forcing.dtype))
+    white = 2.0 * disturbance.noise**2 * weights
+    by_noise = white[..., None] * jnp.eye(len(disturbance.noise), dtype=white.dtype)
+    return jnp.where(system.measured[..., None], jnp.concatenate([shown, by_noise], axis=-1), 0.0)
 
-    F, B = transition(disturbance, system)
-    return jnp.sum(jax.vmap(run)(F, B, system.C, system.measured, weights), axis=0)
+
+def _asked(system: System, weights: Float[Array, "r k c p"]) -> Float[Array, "r k n p"]:
+    """The adjoint of the system: what `weights` of its channels weigh of the force at each sample."""
+    flip = lambda M: M[:, ::-1]
+    shown = flip(jnp.swapaxes(system.C, -1, -2) @ weights)
+    transposed = flip(jnp.swapaxes(system.A, -1, -2))
+    # a weight on a sample's state joins after the step that leads back to it
+    following = propagate(transposed, shown[:, 1:], shown[:, 0])
+    begin, end = jnp.split(jnp.swapaxes(system.G, -1, -2) @ flip(following)[:, 1:], 2, axis=2)
+    around = lambda M, before: jnp.pad(M, [(0, 0), (before, 1 - before), (0, 0), (0, 0)])
+    return around(begin, 0) + around(end, 1)
+
+
+def _correlated(
+    time: Float[Array, " n"], intervals: Float[Array, "r k1"], values: Float[Array, "r k n p"]
+) -> Float[Array, "r k n p"]:
+    r"""$\sum_m e^{-|t_k-t_m|/\tau}v_m$ at every sample, by a pass each way."""
+
+    def step(before: Array, at: tuple[Array, Array]) -> tuple[Array, Array]:
+        rho, value = at
+        before = rho[..., None] * before + value
+        return before, before
+
+    def forth(rho: Array, values: Array) -> Array:
+        return jax.lax.scan(step, jnp.zeros_like(values[0]), (rho, values))[1]
+
+    def run(rho: Array, values: Array) -> Array:
+        begin = jnp.zeros_like(rho[:1])
+        forwards = forth(jnp.concatenate([begin, rho]), values)
+        backwards = forth(jnp.concatenate([begin, rho[::-1]]), values[::-1])[::-1]
+        return forwards + backwards - values
+
+    return jax.vmap(run)(jnp.exp(-intervals[..., None] / time), values)
 
 
 @eqx.filter_jit
