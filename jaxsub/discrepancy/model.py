@@ -60,21 +60,23 @@ def sound(fit: Fit, effects: Sequence[AbstractEffect]) -> bool:
 
 
 def told(view: View, effects: Sequence[AbstractEffect]) -> bool:
-    r"""Whether the recordings tell each of `effects` from nothing, whatever all other numbers are.
+    """Whether the recordings tell each of `effects` from nothing, whatever all other numbers are."""
+    return all(p_value(view, effect) < SIGNIFICANCE for effect in effects)
 
-    By the Wald statistic $a^T P^{-1} a$ of its amplitudes, which is $\chi^2$ for nothing, or of the numbers of an
-    effect that has no amplitude.
+
+def p_value(view: View, effect: AbstractEffect) -> float:
+    r"""How probable so large an `effect` of a view's vehicle is where there is none.
+
+    By the Wald statistic $a^T P^{-1} a$ of its amplitudes, which then is $\chi^2$, or of the numbers of an effect that
+    has no amplitude.
     """
     names, values = [row.name for row in view.vehicle.layout.free], view.vehicle.values()
-    for effect in effects:
-        symbols = effect.symbols()
-        own = [f"{effect.label}.{symbols[name]}" for name in amplitudes(effect) or symbols]
-        at = [names.index(name) for name in own]
-        size = np.array([float(values[name]) for name in own])
-        wald = size @ np.linalg.solve(view.covariance[np.ix_(at, at)], size)
-        if not special.chdtrc(len(at), max(float(wald), 0.0)) < SIGNIFICANCE:
-            return False
-    return True
+    symbols = effect.symbols()
+    own = [f"{effect.label}.{symbols[name]}" for name in amplitudes(effect) or symbols]
+    at = [names.index(name) for name in own]
+    size = np.array([float(values[name]) for name in own])
+    wald = size @ np.linalg.solve(view.covariance[np.ix_(at, at)], size)
+    return float(special.chdtrc(len(at), max(float(wald), 0.0)))
 
 
 def allowing_for(view: View, fit: Fit) -> Fit:

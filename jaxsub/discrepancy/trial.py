@@ -13,11 +13,11 @@ from ..likelihood import Disturbance
 from ..recording.runs import Runs
 from .evidence import evidence_of
 from .generic import Pattern, most_explained
-from .model import allowing_for, join, sound, told
+from .model import allowing_for, join, p_value, sound, told
 from .name import Naming, named_on, refitted, standing
 from .programs import make_room
 from .progress import Progress
-from .selector import Selector
+from .selector import SIGNIFICANCE, Selector
 from .show import HeldOut, Luck, hold, luck
 from .verdict import Judged, helped, settled
 from .view import View, look
@@ -114,6 +114,13 @@ class Tries:
         model = self.model(numbers)
         return sound(model.fit, model.added) and told(model.view, model.added)
 
+    def unsound(self, numbers: Sequence[int]) -> list[int]:
+        """Those of a set that did not come out of its fit so, the worst first."""
+        model, key = self.model(numbers), sorted(numbers)
+        own = dict(zip(key, model.added[len(model.added) - len(key) :], strict=True))
+        luck = {i: p_value(model.view, effect) if sound(model.fit, [effect]) else 1.0 for i, effect in own.items()}
+        return [i for i in sorted(luck, key=lambda i: -luck[i]) if not luck[i] < SIGNIFICANCE]
+
     def helps(self, fewer: Sequence[int], more: int) -> bool:
         """Whether one more on top of `fewer` stands on the held-out runs; what was found is kept in `said`."""
         self.said[more] = self.gain(fewer, [*fewer, more])
@@ -135,18 +142,28 @@ class Tries:
 
 
 def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
-    """All of `chosen`, each as the best of its twins, where none of them can be left out; else nothing.
+    """As many of `chosen` as stand together, each as the best of its twins; nothing if none do.
 
-    With one of two alone the coefficients take up the other.
+    With one of two alone the coefficients take up the other, so all are fitted first, and what no fit bears out or the
+    held-out runs do not ask for is left out: what is left out wrongly is found again from a model with the others.
     """
-    kept: dict[int, Fits] = {}
-    for place, index in enumerate(chosen):
-        fits = tries.closest([*kept, *chosen[place + 1 :]], index)
-        kept[fits[0][0]] = fits
-    if not tries.gain([], [*kept]).helps:
-        return {}
-    stand = all(tries.helps([i for i in kept if i != index], index) for index in reversed([*kept]))
-    return kept if stand else {}
+    while chosen:
+        unsound = tries.unsound(chosen)
+        if unsound:
+            # of two that trade with each other neither is told, and one may be there
+            chosen = [i for i in chosen if i not in unsound] or [i for i in chosen if i != unsound[0]]
+            continue
+        kept: dict[int, Fits] = {}
+        for place, index in enumerate(chosen):
+            fits = tries.closest([*kept, *chosen[place + 1 :]], index)
+            kept[fits[0][0]] = fits
+        if not tries.gain([], [*kept]).helps:
+            return {}
+        idle = next((i for i in reversed([*kept]) if not tries.helps([j for j in kept if j != i], i)), None)
+        if idle is None:
+            return kept
+        chosen = [i for i in kept if i != idle]
+    return {}
 
 
 def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:

@@ -31,8 +31,8 @@ from .tones import tones
 from .whiteness import record_sigma
 
 _restricted = eqx.filter_jit(restricted)
-# scoring steps under one disturbance
-_STEPS = 2
+# of a scoring step, tried one after the other
+_SHARES = (1.0, 0.5)
 # disturbance and numbers are sought in turns until the log likelihood changes by less
 _TURNS, _SETTLED = 8, 0.5
 # rms over sigma of a channel, above which a fit is not trusted to have ended near the truth
@@ -190,6 +190,12 @@ class _At:
         """Minus the log restricted likelihood, a pass of the filter."""
         return float(_restricted(self.disturbance, self.followed.system, self.base, self.prior))
 
+    @cached_property
+    def weighed(self) -> tuple[np.ndarray, float]:
+        """Products of its columns, and minus the log likelihood of its numbers as they are."""
+        gram, spread = products(self.disturbance, self.followed.system, self.base, self.prior)
+        return np.asarray(gram), 0.5 * float(gram[0, 0]) + float(spread)
+
 
 @dataclasses.dataclass(frozen=True)
 class _Led:
@@ -212,23 +218,19 @@ class _Led:
         return _At(vehicle, disturbance, followed, followed.residual + scaled, prior, np.asarray(length))
 
     def descend(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> _At:
-        """Where a few scoring steps lead, halved where they do not make the recordings more probable."""
+        """Where a scoring step leads, or half of it; no step where neither makes the recordings more probable."""
         rows = vehicle.layout.free
         here = np.array([float(vehicle.values()[row.name]) for row in rows])
-        step, before, best = np.zeros_like(here), np.inf, None
-        for _ in range(_STEPS + 1):
-            inside = np.clip(here + step, [row.lower for row in rows], [row.upper for row in rows])
-            trial = vehicle.with_values({row.name: jnp.asarray(v) for row, v in zip(rows, inside, strict=True)})
-            at = self.at(trial, disturbance)
-            gram, spread = products(disturbance, at.followed.system, at.base, at.prior)
-            cost = 0.5 * float(gram[0, 0]) + float(spread)
-            if not cost < before:
-                step = 0.5 * step
-                continue
-            best, here, before = at, inside, cost
-            whole = np.asarray(gram)
-            step = np.linalg.solve(whole[1:, 1:], whole[1:, 0]) / at.length
-        return self.at(vehicle, disturbance) if best is None else best
+        at = self.at(vehicle, disturbance)
+        gram, before = at.weighed
+        step = np.linalg.solve(gram[1:, 1:], gram[1:, 0]) / at.length
+        for share in _SHARES:
+            inside = np.clip(here + share * step, [row.lower for row in rows], [row.upper for row in rows])
+            moved = vehicle.with_values({row.name: jnp.asarray(v) for row, v in zip(rows, inside, strict=True)})
+            trial = self.at(moved, disturbance)
+            if trial.weighed[1] < before:
+                return trial
+        return at
 
 
 @eqx.filter_jit

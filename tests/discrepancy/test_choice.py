@@ -18,7 +18,7 @@ from jaxsub.discrepancy.model import told
 from jaxsub.discrepancy.name import Named, named_on, refitted
 from jaxsub.discrepancy.selector import Scan, Selector
 from jaxsub.discrepancy.show import Luck
-from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, unnamed
+from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, together, unnamed
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM
@@ -139,6 +139,38 @@ def test_a_twin_that_the_held_out_runs_refuse_gives_way_to_the_next():
     assert alone(tries, [0]) == {1: [(1, 20.0), (2, -np.inf)]}
     tries.stand = (0, 1)
     assert alone(tries, [0]) == {0: tries.fits}
+
+
+class Sets(Tries):
+    """Candidates of which one set is the truth: the others are not told, nor are two that trade, nor do fewer help."""
+
+    def __init__(self, truth, trading=()):
+        self.truth, self.trading, self.fitted = truth, {*trading}, []
+
+    def unsound(self, numbers):
+        self.fitted.append(sorted(numbers))
+        untold = {*numbers} - self.truth | (self.trading if self.trading <= {*numbers} else set())
+        return sorted(untold, reverse=True)
+
+    def closest(self, others, index):
+        return [(index, 0.0)]
+
+    def gain(self, fewer, more):
+        return Luck(9.0, 0.001 if self.truth <= {*more} else 1.0, 0.5, 0.001, True, False)
+
+    def helps(self, fewer, more):
+        return more in self.truth
+
+
+def test_of_several_those_that_no_fit_bears_out_are_left_out():
+    """Claim: two of four that are there are kept after a second fit, one of two that trade, and none of none."""
+    tries = Sets({0, 3})
+    assert together(tries, [0, 1, 2, 3]) == {0: [(0, 0.0)], 3: [(3, 0.0)]}
+    assert tries.fitted == [[0, 1, 2, 3], [0, 3]]
+    tries = Sets({0}, trading=(0, 1))
+    assert set(together(tries, [0, 1])) == {0}
+    assert tries.fitted == [[0, 1], [0]]
+    assert together(Sets({0, 5}), [0, 1]) == {}
 
 
 def looked(naming, pattern=None):
