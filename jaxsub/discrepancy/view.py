@@ -21,7 +21,7 @@ from ..likelihood import (
     fitted,
     follow,
     products,
-    restricted,
+    restricted_of,
     smoothed,
     whitened_squares,
 )
@@ -30,7 +30,6 @@ from ..vehicle import AbstractVehicle
 from .tones import tones
 from .whiteness import record_sigma
 
-_restricted = eqx.filter_jit(restricted)
 # of a scoring step, tried one after the other
 _SHARES = (1.0, 0.5)
 # disturbance and numbers are sought in turns until the log likelihood changes by less
@@ -134,8 +133,7 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
         searches = _by_cost(_turned(led, at) for at in searches)[: len(searches) // 2]
     at = _settled(led, searches[0])
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
-    gram, _ = products(at.disturbance, at.followed.system, at.base, at.prior)
-    covariance = np.linalg.inv(np.asarray(gram)[1:, 1:]) / np.outer(at.length, at.length)
+    covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
     return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
@@ -176,7 +174,10 @@ def _white(fit: Fit) -> Array:
 
 @dataclasses.dataclass(frozen=True)
 class _At:
-    """The runs followed by a vehicle under a disturbance, its columns of unit length, their priors, and the lengths."""
+    """The runs followed by a vehicle under a disturbance, its columns of unit length, their priors, and the lengths.
+
+    `gram` are the columns' products, priors included, and `spread` half the log-determinant of the covariance.
+    """
 
     vehicle: AbstractVehicle
     disturbance: Disturbance
@@ -184,17 +185,18 @@ class _At:
     base: Columns
     prior: Array
     length: np.ndarray
+    gram: np.ndarray
+    spread: float
 
     @cached_property
     def cost(self) -> float:
-        """Minus the log restricted likelihood, a pass of the filter."""
-        return float(_restricted(self.disturbance, self.followed.system, self.base, self.prior))
+        """Minus the log restricted likelihood."""
+        return float(restricted_of(jnp.asarray(self.gram), self.spread))
 
-    @cached_property
-    def weighed(self) -> tuple[np.ndarray, float]:
-        """Products of its columns, and minus the log likelihood of its numbers as they are."""
-        gram, spread = products(self.disturbance, self.followed.system, self.base, self.prior)
-        return np.asarray(gram), 0.5 * float(gram[0, 0]) + float(spread)
+    @property
+    def as_they_are(self) -> float:
+        """Minus the log likelihood of its numbers."""
+        return 0.5 * float(self.gram[0, 0]) + self.spread
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,27 +210,32 @@ class _Led:
         """With the residual's and the parameters' columns in units in which each of the latter is of length one."""
         fit, problem = self.fit, self.problem
         followed = follow(vehicle, fit.runs, fit.sigma, disturbance, fit.start, problem.spread)
-        length = lengths(disturbance, followed.system, followed.theta)
-        scaled = jax.tree.map(lambda column: column / length, followed.theta)
+        columns = followed.residual + followed.theta
+        known = len(fit.names) + 1
+        found, spread = products(disturbance, followed.system, columns, jnp.zeros((known, known)))
+        squares = jnp.diag(found)[1:]
+        length = jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
+        unit = jnp.concatenate([jnp.ones(1), length])
         values = vehicle.values()
         away = problem.prior_mean - jnp.asarray([float(values[name]) for name in fit.names])
         pulled = jnp.column_stack([away, jnp.diag(1.0 / length)]) / problem.prior_std[:, None]
-        untold = jnp.full(len(fit.names) + 1, _UNTOLD).at[0].set(0.0)
+        untold = jnp.full(known, _UNTOLD).at[0].set(0.0)
         prior = pulled.T @ pulled + jnp.diag(untold)
-        return _At(vehicle, disturbance, followed, followed.residual + scaled, prior, np.asarray(length))
+        base = jax.tree.map(lambda column: column / unit, columns)
+        gram = np.asarray(found / jnp.outer(unit, unit) + prior)
+        return _At(vehicle, disturbance, followed, base, prior, np.asarray(length), gram, float(spread))
 
     def descend(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> _At:
         """Where a scoring step leads, or half of it; no step where neither makes the recordings more probable."""
         rows = vehicle.layout.free
         here = np.array([float(vehicle.values()[row.name]) for row in rows])
         at = self.at(vehicle, disturbance)
-        gram, before = at.weighed
-        step = np.linalg.solve(gram[1:, 1:], gram[1:, 0]) / at.length
+        step = np.linalg.solve(at.gram[1:, 1:], at.gram[1:, 0]) / at.length
         for share in _SHARES:
             inside = np.clip(here + share * step, [row.lower for row in rows], [row.upper for row in rows])
             moved = vehicle.with_values({row.name: jnp.asarray(v) for row, v in zip(rows, inside, strict=True)})
             trial = self.at(moved, disturbance)
-            if trial.weighed[1] < before:
+            if trial.as_they_are < at.as_they_are:
                 return trial
         return at
 

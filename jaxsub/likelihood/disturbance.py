@@ -103,7 +103,11 @@ def restricted(
     The first of the `columns` is the residual, the others are fitted to it; `prior` is the Gram matrix of the residual
     and columns of their priors.
     """
-    gram, spread = products(disturbance, system, columns, prior)
+    return restricted_of(*products(disturbance, system, columns, prior))
+
+
+def restricted_of(gram: Float[Array, "p1 p1"], spread: Float[Array, ""] | float) -> Float[Array, ""]:
+    """`restricted` by the `products` of the columns and half the log-determinant of the residuals' covariance."""
     among = jnp.linalg.cholesky(gram[1:, 1:])
     explained = solve_triangular(among, gram[1:, 0], lower=True)
     return spread + jnp.sum(jnp.log(jnp.diagonal(among))) + 0.5 * (gram[0, 0] - explained @ explained)
