@@ -6,6 +6,7 @@ Commands come at steps of h s, far finer than the recording, each constant over 
 import jax
 import jax.numpy as jnp
 
+from .bodies import LARGEST_RUDDER
 from .truth import Truth
 
 _DRIVES = {
@@ -44,10 +45,13 @@ def _rate_limit(a, h, held):
     return jax.lax.scan(step, held[0], held)[1]
 
 
+def _stop(a):
+    """Of the rudder, rad: a grows from zero, where no command is cut."""
+    return 1.0 / (a + 1.0 / LARGEST_RUDDER)
+
+
 def _saturation(a, h, held):
-    """Stops at 1/(a + 1/the largest command): a grows from zero, where nothing is cut."""
-    top = 1.0 / (a + 1.0 / jnp.max(jnp.abs(held)))
-    return jnp.clip(held, -top, top)
+    return jnp.clip(held, -_stop(a), _stop(a))
 
 
 def _deadband(a, h, held):
@@ -80,7 +84,7 @@ ACTUATORS = (
     _on("elevator_right", "actuator-lag", _lag, 10.0, lambda a: {"T": a}),
     _on("rudder", "actuator-delay", _delay, 5.0, lambda a: {"tau": a}),
     _on("rudder", "actuator-rate-limit", _rate_limit, 200.0, lambda a: {"R": 1.0 / a}),
-    _on("rudder", "actuator-saturation", _saturation, 30.0),
+    _on("rudder", "actuator-saturation", _saturation, 30.0, lambda a: {"limit": _stop(a)}),
     _on("rudder", "actuator-deadband", _deadband, 0.2, lambda a: {"d": a}),
     _on("rudder", "actuator-backlash", _backlash, 0.2),
     _on("rudder", "actuator-misalignment", lambda a, h, held: held + a, 0.3, lambda a: {"b": a}),

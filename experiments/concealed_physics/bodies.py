@@ -19,6 +19,8 @@ CRUISE_SHAFT = 60.0
 NO_VELOCITY = ("p", "q", "r", "phi", "theta", "psi", "z")
 _ENVIRONMENT = {"nps-temperature": {"temperature": "T"}, "nps-altitude": {"altitude": "altitude"}}
 _DEPTH = {"nps-altitude": 32.0, "nps-shallow": 5.0, "dsrv": 60.0}
+# rad, which no run's command of the rudder exceeds
+LARGEST_RUDDER = 0.32
 _DIVE = {"nps-altitude": 0.5, "nps-shallow": 0.35}
 
 
@@ -85,7 +87,7 @@ def commands(name: str, run: int, samples: int, rng: np.random.Generator) -> np.
 def _rudder(t: np.ndarray, run: int, draw, seed) -> np.ndarray:
     """A zigzag, a circle each way, or a random sequence, in a different order in each run."""
     third = len(t) // 3
-    zigzag = square(t, draw(14.0, 26.0), draw(0.2, 0.32))
+    zigzag = square(t, draw(14.0, 26.0), draw(0.2, LARGEST_RUDDER))
     circles = square(t, draw(60.0, 80.0), draw(0.12, 0.2))
     random = prbs(len(t), 25 + 5 * run, draw(0.2, 0.28), seed())
     order = np.roll([zigzag, circles, random], run, axis=0)

@@ -37,7 +37,8 @@ def _heat(recovery: dict, axis) -> None:
             colour = "white" if cell["rate"] > 0.6 else "black"
             axis.text(j, i, f"{round(cell['rate'] * cell['n'])}/{cell['n']}", ha="center", va="center", fontsize=7,
                       color=colour)  # fmt: skip
-    axis.imshow(table, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+    if table.size:
+        axis.imshow(table, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
     axis.set_facecolor("0.95")
     axis.set_xticks(range(len(sizes)), [f"{size:g}" for size in sizes])
     axis.set_yticks(range(len(recovery)), list(recovery), fontsize=8)
@@ -47,22 +48,24 @@ def _heat(recovery: dict, axis) -> None:
 
 def _table(results: dict, axis) -> None:
     """Share right in each condition with its 95 % interval and target, the peers' beside it."""
-    answerers = {"jaxsub": results["conditions"]} | {p: results["peers"][p]["conditions"] for p in _PEERS}
-    labels = [row["condition"] for row in results["conditions"]]
+    whose = {"jaxsub": results["conditions"]} | {p: results["peers"][p]["conditions"] for p in _PEERS}
+    judged = [i for i, row in enumerate(results["conditions"]) if row["n"]]
+    answerers = {who: [rows[i] for i in judged] for who, rows in whose.items()}
     high = 0.8 / len(answerers)
     for k, (who, rows) in enumerate(answerers.items()):
+        label = _PEERS.get(who, who)
         for i, row in enumerate(rows):
             score, y = row["right"], i - 0.4 + (k + 0.5) * high
             if score["rate"] is None:
                 continue
-            label = _PEERS.get(who, who) if i == 0 else None
             axis.barh(y, score["rate"], 0.9 * high, color=_COLOURS[who], label=label)
+            label = None
             low, top = score["interval"]
             axis.plot([low, top], [y, y], color="0.2", lw=1.2)
-    for i, row in enumerate(results["conditions"]):
+    for i, row in enumerate(answerers["jaxsub"]):
         axis.plot([row["target"]] * 2, [i - 0.45, i + 0.45], color="k", lw=2, label="target" if i == 0 else None)
-    axis.set_yticks(range(len(labels)), [f"{label}\n(n = {row['n']})" for label, row in
-                                         zip(labels, results["conditions"], strict=True)], fontsize=8)  # fmt: skip
+    labels = [f"{row['condition']}\n(n = {row['n']})" for row in answerers["jaxsub"]]
+    axis.set_yticks(range(len(labels)), labels, fontsize=8)
     axis.set_ylim(len(labels) - 0.5, -0.5)
     axis.set_xlim(0.0, 1.02)
     axis.set_xlabel("share right")

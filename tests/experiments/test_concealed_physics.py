@@ -51,6 +51,17 @@ def test_lag_has_the_mean_of_the_exact_step_response():
     np.testing.assert_allclose(lag(jnp.asarray(seconds), h, held)[5:], np.diff(integral) / h, rtol=1e-9)
 
 
+def test_a_concealed_stop_is_the_same_in_every_run():
+    """Claim: runs of different largest commands stop at the one limit that the truth states."""
+    stop = next(t for t in ACTUATORS if t.name == "actuator-saturation")
+    drawn = [bodies.commands("nps", run, 800, np.random.default_rng(run))[:, 0] for run in range(4)]
+    largest = [np.abs(held).max() for held in drawn]
+    assert max(largest) - min(largest) > 0.01
+    assert max(largest) <= bodies.LARGEST_RUDDER
+    reached = [float(jnp.abs(stop.command(3.0, 0.2, jnp.asarray(held))).max()) for held in drawn]
+    np.testing.assert_allclose(reached, stop.numbers(3.0)["limit"], rtol=1e-12)
+
+
 def test_size_counts_only_what_no_coefficient_can_absorb():
     vehicle, driven = bodies.body("rig"), drive()
     seen = Unabsorbed(vehicle, driven, np.array([0.005, 0.01]))
