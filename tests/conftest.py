@@ -5,7 +5,11 @@ from collections.abc import Iterator
 import jax
 import jaxtyping
 import pytest
+from hypothesis import settings
 
+# the same examples at every run
+settings.register_profile("seeded", derandomize=True, deadline=None)
+settings.load_profile("seeded")
 jax.config.update("jax_enable_x64", True)
 # Most of the suite's time is compilation of programs that run once.
 jax.config.update("jax_disable_most_optimizations", True)
