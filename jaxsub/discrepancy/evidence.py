@@ -51,30 +51,35 @@ class Products:
 
     - `gram`: (1 + p + q, 1 + p + q): residual, free parameters, candidates; priors of the first 1 + p included.
     - `parts`: (m, 1 + p + q, 1 + p + q) of it in m parts of the recordings, priors apart.
-    - `spread`: half the log-determinant of the residuals' covariance. `samples`: how many.
+    - `spreads`: (m,) half the log-determinant of the residuals' covariance, in parts. `samples`: how many.
     """
 
     disturbance: Disturbance
     gram: np.ndarray
-    spread: float
+    spreads: np.ndarray
     samples: int
     known: int
     parts: np.ndarray
 
-    def predicted(self, chosen: Sequence[int]) -> float:
-        """Log likelihood of each part of the recordings, amplitudes and parameters those that the others ask for."""
-        index, total = self._index(chosen), 0.0
-        for part in self.parts:
+    def predicted(self, chosen: Sequence[int]) -> np.ndarray:
+        """(m,) log likelihood of each part of the recordings, all numbers those that the others ask for."""
+        index, found = self._index(chosen), -self.spreads
+        for k, part in enumerate(self.parts):
             w = np.linalg.solve(self._block(self.gram - part, chosen), (self.gram - part)[index, 0])
-            total -= 0.5 * float(part[0, 0] - 2.0 * w @ part[index, 0] + w @ part[np.ix_(index, index)] @ w)
-        return total - self.spread
+            found[k] -= 0.5 * float(part[0, 0] - 2.0 * w @ part[index, 0] + w @ part[np.ix_(index, index)] @ w)
+        return found
+
+    def elsewhere(self, columns: Sequence[int]) -> np.ndarray:
+        """(m,) the least share of the squares of some candidate columns that is in other parts than each."""
+        at = self.known + np.array(columns)
+        return np.min(1.0 - self.parts[:, at, at] / np.maximum(self.gram[at, at], 1e-300), axis=1)
 
     def log_evidence(self, chosen: Sequence[int]) -> float:
         """Of the recordings with the candidate columns `chosen` in the model."""
         factor = np.linalg.cholesky(self._block(self.gram, chosen))
         half = np.linalg.solve(factor, self.gram[self._index(chosen), 0])
         occam = float(np.sum(np.log(np.diag(factor)))) + 0.5 * len(chosen) * np.log(self.samples)
-        return 0.5 * (half @ half - self.gram[0, 0]) - self.spread - occam
+        return 0.5 * (half @ half - self.gram[0, 0]) - float(np.sum(self.spreads)) - occam
 
     def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> Gains:
         """What each further candidate would add to `chosen`."""
@@ -175,12 +180,12 @@ class Evidence:
         view = self.view
         system = view.followed.system
         pieces = max(1, -(-_PARTS // len(system.measured)))
-        found, spread = _parts(disturbance, system, self.whole, pieces)
+        found, spreads = _parts(disturbance, system, self.whole, pieces)
         parts, known = np.asarray(found), len(view.prior)
         gram = parts.sum(axis=0)
         gram[:known, :known] += np.asarray(view.prior)
         samples = int(np.sum(np.asarray(system.measured)))
-        return Products(disturbance, gram, float(spread), samples, known, parts)
+        return Products(disturbance, gram, np.asarray(spreads), samples, known, parts)
 
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
@@ -213,10 +218,10 @@ class Evidence:
 @eqx.filter_jit
 def _parts(
     disturbance: Disturbance, system: System, columns: Columns, pieces: int
-) -> tuple[Float[Array, "m q q"], Float[Array, ""]]:
-    """Products of all columns whitened in `pieces` of every run, and half the log-determinant of all."""
-    found, spread = part_products(disturbance, system, columns, pieces)
-    return found.reshape(-1, *found.shape[2:]), spread
+) -> tuple[Float[Array, "m q q"], Float[Array, " m"]]:
+    """Products of all columns whitened in `pieces` of every run, and half the log-determinant of each."""
+    found, spreads = part_products(disturbance, system, columns, pieces)
+    return found.reshape(-1, *found.shape[2:]), spreads.reshape(-1)
 
 
 def evidence_of(view: View) -> float:

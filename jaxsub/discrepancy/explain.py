@@ -1,5 +1,7 @@
 """What the recordings ask for, tried and asked again until what is left is random, refused or without a name."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..effects import AbstractEffect, candidates, looked_at
@@ -7,12 +9,14 @@ from ..likelihood import whitened
 from .columns import candidate_columns
 from .evidence import Evidence
 from .generic import pattern
+from .model import sound, told
 from .name import MOST_EFFECTS, Naming, name
 from .programs import make_room
 from .progress import Progress
 from .selector import Selector
+from .show import luck
 from .trial import Found, Model, Trial, tried, unnamed, worth_trying
-from .verdict import NOTHING, Judged, both, judge
+from .verdict import NOTHING, Judged, both, idle, judge
 from .view import View, facts
 from .whiteness import RANDOM, Memory, memory
 
@@ -65,11 +69,13 @@ def explained(
         said, after = judge(found.naming, found.pattern, found.memory), None
         chosen = worth_trying(found, said)
         if chosen:
-            best, said = tried(trial, best, found, chosen, said)
+            older, (best, said) = best.added, tried(trial, best, found, chosen, said)
+            judged = both(judged, said)
+            best, judged = without_idle(trial, baseline, best, judged, older if said.named else ())
         else:
             best, said, after = after_all(trial, best, found, said, vocabulary)
-        judged = both(judged, said)
-        if chosen and said.verdict == "unknown" and not best.added and refusals < _REFUSALS:
+            judged = both(judged, said)
+        if chosen and said.verdict == "unknown" and refusals < _REFUSALS:
             refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
         if after is None and not said.named:
             return unnamed(trial, best, found, judged)
@@ -77,6 +83,24 @@ def explained(
         if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
             return best, judged
         found = after or examine(best.view, vocabulary, trial.progress)
+
+
+def without_idle(
+    trial: Trial, baseline: Model, best: Model, judged: Judged, older: Sequence[AbstractEffect]
+) -> tuple[Model, Judged]:
+    """The model less those `older` effects that the held-out runs ask for no more, and what is then to be said.
+
+    What was added first may have stood in for what came after it.
+    """
+    for effect in older:
+        others = [e.label for e in best.added if e.label != effect.label]
+        fewer = trial.with_effects(
+            baseline, [e for e in best.fit.vehicle.effects if e.label in others], best.view.disturbance
+        )
+        stands = any(luck(fewer.shown, best.shown, True, freely=freely).helps for freely in (False, True))
+        if not stands and sound(fewer.fit, fewer.added) and told(fewer.view, fewer.added):
+            best, judged = fewer, idle(judged, effect.label, others)
+    return best, judged
 
 
 def after_all(

@@ -153,8 +153,8 @@ class _Weighed:
         """Whether parts of the recordings are better predicted with the force, each under what suits it."""
         both = list(range(self.count + FINE))
         products = self.evidence.products
-        with_it = max(self.together(p, own)[0].predicted(both) for p in products)
-        return with_it > max(p.predicted(self.held) for p in products)
+        with_it = max(float(np.sum(self.together(p, own)[0].predicted(both))) for p in products)
+        return with_it > max(float(np.sum(p.predicted(self.held))) for p in products)
 
     def heights(self, at: int, own: list[int]) -> tuple[np.ndarray, float]:
         """Of the force, and the share of what it and the chosen explain that the chosen explain alone."""

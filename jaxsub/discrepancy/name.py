@@ -36,7 +36,8 @@ class Named:
     **Fields**
 
     - `number`: of the candidate; `effect`: with its predicted numbers; `probability`: of its name.
-    - `rivals`: with their probabilities. `twins`: numbers of rivals that a linear picture cannot tell from it.
+    - `rivals`: with their probabilities. `twins`: numbers of rivals to be fitted, which a linear picture
+      cannot tell from it or finds more probable.
     """
 
     number: int
@@ -160,7 +161,9 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     near = [j for key, j in best.items() if key != label and np.isfinite(log[j])]
     place = scan.effects[index].where
     far = lambda j: _SAME_PLACE if scan.effects[j].where == place else off
-    near = [j for j in near if scan.statistic[j] > (1.0 - far(j)) * scan.statistic[index]]
+    # a free run may ask for what is less probable sample by sample than a rival, which then is tried before it
+    alike = lambda j: scan.statistic[j] > (1.0 - far(j)) * scan.statistic[index] or log[j] > log[index]
+    near = [j for j in near if alike(j)]
     twins = sorted(near, key=lambda j: -log[j])[:_TWINS]
     return Named(index, scan.effects[index], by_name[own], sorted(rivals, key=lambda rival: -rival[1]), twins)
 

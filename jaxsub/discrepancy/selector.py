@@ -26,6 +26,8 @@ _LARGE = 4.0
 # times the errors that a candidate leaves and explains: what may stand in its place leaves no more, explains no less
 _NO_MORE, _NO_LESS = 2.0, 0.5
 _STILL = 1e-6
+# of the squares of an effect, the share that other parts of the recordings hold where they can foretell one
+_FORETOLD = 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,21 +130,25 @@ class Selector:
         share = self.of_free_run(chosen)
         if share[best] > _LITTLE:
             return best
-        p_values = [self.p_value(i, scan) for i in range(len(self.candidates))]
-        asked = (scan.value > self.value(chosen)) & (np.array(p_values) < SIGNIFICANCE) & (share > _MORE)
+        asked = self._asked(chosen, scan) & (share > _MORE)
         if not np.any(asked):
             return best
         best = int(np.argmax(np.where(asked, share, -np.inf)))
         self.freely.add(best)
         return best
 
-    def ruling(self, chosen: Sequence[int]) -> int | None:
-        """Which of `chosen` alone explains most of a free run's errors, where they are much larger than the noise."""
+    def _asked(self, chosen: Sequence[int], scan: Scan) -> np.ndarray:
+        """(m,) whether the recordings ask for each candidate on top of `chosen`, if not for it most."""
+        p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
+        return (scan.value > self.value(chosen)) & (p_values < SIGNIFICANCE)
+
+    def ruling(self) -> int | None:
+        """Which candidate alone explains most of a free run's errors, where they are much larger than the noise."""
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
-        share = self.of_free_run([])
-        best = max(chosen, key=lambda i: share[i], default=None)
+        share = np.where(self._asked([], self.scan([])), self.of_free_run([]), 0.0)
+        best = int(np.argmax(share))
         large = self.free.gram[0, 0] > _LARGE * noise * self.free.samples
-        return best if best is not None and large and share[best] > _MUCH else None
+        return best if large and share[best] > _MUCH else None
 
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate may stand where `index` does, on top of `chosen`.
@@ -156,12 +162,15 @@ class Selector:
         return (1.0 - share <= _NO_MORE * (1.0 - share[index])) & (share >= _NO_LESS * share[index])
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
-        """Whether `more` helps to predict parts of the recordings, or of a free run that asked, from the others."""
+        """Whether `more` helps to predict parts of the recordings, or of a free run that asked, from the others.
+
+        A part is not asked where all others together tell too little of it: a stop that a rudder meets in one part.
+        """
         before, after = self.columns(chosen), self.columns([*chosen, more])
-        if more in self.freely:
-            return self.free.predicted(after) > self.free.predicted(before)
-        with_it = self.evidence.best(after)[1].predicted(after)
-        return with_it > self.evidence.best(before)[1].predicted(before)
+        free = more in self.freely
+        without, with_it = (self.free if free else self.evidence.best(columns)[1] for columns in (before, after))
+        asked = with_it.elsewhere(self.owners[more]) > _FORETOLD
+        return bool(np.sum((with_it.predicted(after) - without.predicted(before))[asked]) > 0.0)
 
     def p_value(self, index: int, scan: Scan) -> float:
         """Of a candidate's χ², corrected for all that were tried."""

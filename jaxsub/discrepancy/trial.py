@@ -92,8 +92,8 @@ class Trial:
 class Tries:
     """Models with some of the candidates of one look at the recordings, by number, each fitted once."""
 
-    def __init__(self, trial: Trial, base: Model, found: Found):
-        self.trial, self.found = trial, found
+    def __init__(self, trial: Trial, base: Model, found: Found, freely: bool):
+        self.trial, self.found, self.freely = trial, found, freely
         self.models: dict[tuple[int, ...], Model] = {(): base}
         self.said: dict[int, Luck] = {}
 
@@ -129,7 +129,7 @@ class Tries:
     def gain(self, fewer: Sequence[int], more: Sequence[int]) -> Luck:
         """What the held-out runs gain from the one set to the other."""
         before, after = self.model(fewer).shown, self.model(more).shown
-        return luck(before, after, self.sound(more), freely=self.found.naming.again)
+        return luck(before, after, self.sound(more), freely=self.freely)
 
     def value(self, numbers: Sequence[int]) -> float:
         """Log evidence of the fit with these; minus infinity where they are not sound."""
@@ -197,7 +197,8 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
     picture adds effects that only make up for each other, and one of them put into the model shows what is left.
     Where none does, those that were fitted are no candidates of `found` any more.
     """
-    tries, effects = Tries(trial, base, found), found.selector.candidates
+    freely = not found.selector.freely.isdisjoint(chosen)
+    tries, effects = Tries(trial, base, found, freely), found.selector.candidates
     kept = alone(tries, leading(found.selector, chosen))
     if not kept and len(chosen) > 1:
         kept = together(tries, chosen) or alone(tries, chosen)
@@ -206,7 +207,9 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
         judged = helped(judged, effects[index], tries.said[index])
     # how probable each is was said before twins were fitted, and with what was refused in the model
     if not kept:
-        found.selector.usable[[key[0] for key in tries.models if len(key) == 1]] = False
+        # a fit has found the best shape of its effect: other shapes of it would end there too
+        fallen = {effects[key[0]].label for key in tries.models if len(key) == 1}
+        found.selector.usable[[effect.label in fallen for effect in effects]] = False
     named = standing(found.selector, [*kept], refused)
     stand = [refitted(one, [(effects[i], value) for i, value in kept[one.number]]) for one in named]
     return tries.model([*kept]), settled(judged, stand)
@@ -217,15 +220,17 @@ def worth_trying(found: Found, judged: Judged) -> list[int]:
 
     A force that leaves so much less of a free run's errors shows that the ruling effect is not their cause.
     """
-    numbers = [one.number for one in found.naming.named]
     if judged.named:
-        return numbers
+        return [one.number for one in found.naming.named]
     selector = found.selector
-    ruling = selector.ruling(numbers)
+    ruling = selector.ruling()
     if ruling is None:
         return []
     left = 1.0 - selector.of_free_run([])[ruling]
-    return [ruling] if left < _MUCH_LESS * (1.0 - most_explained(found.view, selector.free.disturbance)) else []
+    if left > _MUCH_LESS * (1.0 - most_explained(found.view, selector.free.disturbance)):
+        return []
+    selector.freely.add(ruling)
+    return [ruling]
 
 
 def as_well_known(base: Model, more: Model) -> bool:

@@ -86,6 +86,13 @@ def _gain_said(label: str, gain: Luck) -> str:
     return f"{label} fitted the training runs better but {why}, and is not accepted."
 
 
+def idle(judged: Judged, label: str, others: Sequence[str]) -> Judged:
+    """The verdict less an effect that is not asked for any more beside `others`."""
+    named = [one for one in judged.named if one.effect.label != label]
+    note = f"Beside {', '.join(others)} the held-out runs ask for {label} no more, and it is left out."
+    return dataclasses.replace(judged, verdict=_certainty(named), named=named, notes=[*judged.notes, note])
+
+
 def settled(judged: Judged, stand: list[Named]) -> Judged:
     """The verdict once everything was tried: named by what stands.
 

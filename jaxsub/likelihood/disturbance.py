@@ -145,8 +145,8 @@ def whitened_squares(disturbance: Disturbance, system: System, columns: Columns)
 
 def part_products(
     disturbance: Disturbance, system: System, columns: Columns, parts: int
-) -> tuple[Float[Array, "r m q q"], Float[Array, ""]]:
-    """Products of all columns whitened, in each of `parts` of every run; half the log-determinant of all."""
+) -> tuple[Float[Array, "r m q q"], Float[Array, "r m"]]:
+    """Products of all columns whitened, in each of `parts` of every run; half the log-determinant of each part."""
     return products_by_part(*steps(disturbance, system, columns), parts)
 
 

@@ -93,8 +93,8 @@ def passes(steps: Steps, begin: Float[Array, "z z"], of: Callable[[Passed], T]) 
 
 def products_by_part(
     steps: Steps, begin: Float[Array, "z z"], parts: int
-) -> tuple[Float[Array, "r m q q"], Float[Array, ""]]:
-    """Products of the whitened innovations in each of `parts` of every run; half the log-determinant of all.
+) -> tuple[Float[Array, "r m q q"], Float[Array, "r m"]]:
+    """Products of the whitened innovations in each of `parts` of every run; half the log-determinant of each part.
 
     What is stored besides the steps are a few samples' innovations, however long the runs are. Samples are read where
     they lie, for copies of very many columns would take longer than to filter them.
@@ -126,8 +126,7 @@ def products_by_part(
 
     nothing = jnp.zeros((len(begin), q), steps.shown.dtype)
     # one run after the other: products of three dimensions are slower than three of two
-    gram, logarithm = jax.lax.map(of_run, jnp.arange(runs))
-    return gram, jnp.sum(logarithm)
+    return jax.lax.map(of_run, jnp.arange(runs))
 
 
 @jax.custom_vjp

@@ -16,7 +16,7 @@ from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.explain import after_all
 from jaxsub.discrepancy.model import told
 from jaxsub.discrepancy.name import Named, named_on, refitted
-from jaxsub.discrepancy.selector import Scan, Selector
+from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.show import Luck
 from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, together, unnamed
 from jaxsub.discrepancy.verdict import Judged
@@ -284,37 +284,6 @@ def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monk
     assert after_all(trial, base, seen("surge", yaw, roll), unknown, None) == (base, unknown, None)
     assert after_all(trial, base, seen(None, yaw, roll), unknown, None) == (base, unknown, None)
     assert asked == [[7]]
-
-
-class Freely(Selector):
-    """What `foremost` and `stand_in` ask of a selector: shares of a free run's errors, which are given."""
-
-    def __init__(self, *shares):
-        self.candidates, self.freely = [None] * len(shares), set()
-        self.of_free_run = lambda chosen: np.array(shares)
-        self.value = lambda chosen: 0.0
-        self.p_value = lambda index, scan: 1e-6
-
-
-def test_what_a_free_run_asks_for_comes_before_what_hardly_shows_in_one():
-    """Claim: a leader of 1.6 % of a free run's errors gives way to one of 24 %, not to one of 10 % nor without gain."""
-    gains = lambda *values: Scan(np.array(values), np.zeros(len(values)), [], np.zeros(len(values)))
-    asked = Freely(0.016, 0.24, 0.3)
-    assert asked.foremost([], gains(137.0, 27.0, -1.0)) == 1
-    assert asked.freely == {1}
-    assert Freely(0.016, 0.1).foremost([], gains(137.0, 27.0)) == 0
-    assert Freely(0.05, 0.24).foremost([], gains(137.0, 27.0)) == 0
-
-
-def test_only_what_explains_as_much_of_a_free_run_stands_in_for_what_it_asked_for():
-    """Claim: less than half of its share, or more than twice what it leaves, is none of its rivals."""
-    asked = Freely(0.016, 0.24, 0.13, 0.11)
-    asked.freely.add(1)
-    assert asked.stand_in([], 1).tolist() == [False, True, True, False]
-    assert asked.stand_in([], 0).tolist() == [True] * 4
-    asked = Freely(0.9, 0.7, 0.85)
-    asked.freely.add(0)
-    assert asked.stand_in([], 0).tolist() == [True, False, True]
 
 
 @pytest.mark.parametrize(("error", "joins"), [(0.015, True), (0.5, False)])

@@ -44,7 +44,7 @@ def dense():
     prior = np.diag([0.0, 0.3, 0.2, 0.1])
     gram = W.T @ W
     gram[:4, :4] += prior
-    return W, prior, Products(Disturbance(*jnp.ones((3, 1))), gram, 0.7, 40, 4, gram[None])
+    return W, prior, Products(Disturbance(*jnp.ones((3, 1))), gram, np.array([0.7]), 40, 4, gram[None])
 
 
 def log_evidence(W, prior, chosen):
@@ -81,7 +81,7 @@ def test_statistic_is_chi_square_where_nothing_is_left_out(clean):
         white[:, 0] = rng.standard_normal(len(white)) * measured
         gram = white.T @ white
         gram[: len(clean.prior), : len(clean.prior)] += np.asarray(clean.prior)
-        products = Products(clean.disturbance, gram, 0.0, int(measured.sum()), len(clean.prior), gram[None])
+        products = Products(clean.disturbance, gram, np.zeros(1), int(measured.sum()), len(clean.prior), gram[None])
         single = [own for own in owners if len(own) == 1]
         kept = products.kept(single)
         draws.append(products.gains([], single).statistic[kept > 1e-3])

@@ -26,7 +26,7 @@ def told(residual, seed=0, known=lambda x, rng: rng.normal(size=len(x))):
     parts = np.stack([w.T @ w for w in np.split(W, 4)])
     gram = parts.sum(axis=0)
     gram[range(1, KNOWN), range(1, KNOWN)] += 0.2
-    return W, length, Products(Disturbance(*jnp.ones((3, 1))), gram, 0.0, SAMPLES, KNOWN, parts)
+    return W, length, Products(Disturbance(*jnp.ones((3, 1))), gram, np.zeros(len(parts)), SAMPLES, KNOWN, parts)
 
 
 def test_evidence_is_the_integral_over_functions():

@@ -1,0 +1,105 @@
+"""What a free run or a part of the recordings asks for, and what stood in for something else."""
+
+import sys
+from types import SimpleNamespace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxsub.discrepancy.evidence import Products
+from jaxsub.discrepancy.explain import without_idle
+from jaxsub.discrepancy.name import Named
+from jaxsub.discrepancy.selector import Scan, Selector
+from jaxsub.discrepancy.show import Luck
+from jaxsub.discrepancy.trial import Model, Trial
+from jaxsub.discrepancy.verdict import Judged
+from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
+from jaxsub.likelihood import Disturbance
+
+
+class Freely(Selector):
+    """What `foremost` and `stand_in` ask of a selector: shares of a free run's errors, which are given."""
+
+    def __init__(self, *shares):
+        self.candidates, self.freely = [None] * len(shares), set()
+        self.of_free_run = lambda chosen: np.array(shares)
+        self.value = lambda chosen: 0.0
+        self.p_value = lambda index, scan: 1e-6
+
+
+def test_what_a_free_run_asks_for_comes_before_what_hardly_shows_in_one():
+    """Claim: a leader of 1.6 % of a free run's errors gives way to one of 24 %, not to one of 10 % nor without gain."""
+    gains = lambda *values: Scan(np.array(values), np.zeros(len(values)), [], np.zeros(len(values)))
+    asked = Freely(0.016, 0.24, 0.3)
+    assert asked.foremost([], gains(137.0, 27.0, -1.0)) == 1
+    assert asked.freely == {1}
+    assert Freely(0.016, 0.1).foremost([], gains(137.0, 27.0)) == 0
+    assert Freely(0.05, 0.24).foremost([], gains(137.0, 27.0)) == 0
+
+
+def test_only_what_explains_as_much_of_a_free_run_stands_in_for_what_it_asked_for():
+    """Claim: less than half of its share, or more than twice what it leaves, is none of its rivals."""
+    asked = Freely(0.016, 0.24, 0.13, 0.11)
+    asked.freely.add(1)
+    assert asked.stand_in([], 1).tolist() == [False, True, True, False]
+    assert asked.stand_in([], 0).tolist() == [True] * 4
+    asked = Freely(0.9, 0.7, 0.85)
+    asked.freely.add(0)
+    assert asked.stand_in([], 0).tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize(("column", "helps"), [(1.0, True), (0.0, False)])
+def test_what_one_part_alone_shows_is_not_refused_by_the_others(column, helps):
+    """Claim: an effect seen in one part need not foretell it; one seen in all, of other sizes, must and fails."""
+    rng = np.random.default_rng(5)
+    shown = rng.standard_normal(200) * np.where(np.repeat(range(4), 50) == 3, 1.0, 1.0 - column)
+    sizes = np.repeat([2.0, -2.0, 2.0, -2.0], 50)
+    W = np.column_stack([0.1 * rng.standard_normal(200) + sizes * shown, rng.standard_normal(200), shown])
+    parts = np.stack([w.T @ w for w in np.split(W, 4)])
+    still = Disturbance(*jnp.ones((3, 1)))
+    # where the effect is left out a disturbance stands for it, of a variance that is 1.5 of the noise's
+    wide = Products(still, parts.sum(axis=0) / 1.5, np.full(4, 25.0 * np.log(1.5)), 200, 2, parts / 1.5)
+    bare = Products(still, parts.sum(axis=0), np.zeros(4), 200, 2, parts)
+    asked = object.__new__(Selector)
+    asked.owners, asked.freely = [[0]], set()
+    asked.evidence = SimpleNamespace(best=lambda columns: (0.0, bare if columns else wide))
+    assert bare.elsewhere([0]) == pytest.approx([1.0, 1.0, 1.0, 0.0] if column else np.full(4, 0.75), abs=0.1)
+    assert asked.predicts([], 0) == helps
+
+
+def test_what_rules_a_free_run_need_not_be_what_was_chosen_sample_by_sample():
+    """Claim: of those that the recordings ask for the one that explains most rules, if that is more than half."""
+    gains = lambda *values: Scan(np.array(values), np.zeros(len(values)), [], np.zeros(len(values)))
+
+    def ruling(gram, values, *shares):
+        asked = Freely(*shares)
+        asked.evidence = SimpleNamespace(view=SimpleNamespace(disturbance=SimpleNamespace(noise=np.ones(2))))
+        asked.free = SimpleNamespace(gram=np.array([[gram]]), samples=10)
+        asked.scan = lambda chosen: gains(*values)
+        return asked.ruling()
+
+    assert ruling(50.0, (137.0, 27.0, -1.0), 0.1, 0.54, 0.9) == 1
+    assert ruling(50.0, (137.0, 27.0, -1.0), 0.1, 0.4, 0.9) is None
+    assert ruling(30.0, (137.0, 27.0, -1.0), 0.1, 0.54, 0.9) is None
+
+
+@pytest.mark.parametrize(("gain", "kept"), [(9.0, True), (-9.0, False)])
+def test_what_stood_in_for_a_later_effect_is_left_out(monkeypatch, gain, kept):
+    """Claim: an older effect without which held-out runs are predicted as well goes, and its name with it."""
+    old, new = CubicDamping("yaw", -0.5), QuadraticDamping("surge", -0.5)
+    fit = SimpleNamespace(vehicle=SimpleNamespace(effects=(old, new)))
+    best, fewer = Model(fit, SimpleNamespace(disturbance=None), None, (old, new)), Model(fit, None, None, (new,))
+    trial, asked = object.__new__(Trial), []
+    fitted = lambda base, effects, disturbance: asked.append(effects) or fewer
+    object.__setattr__(trial, "with_effects", fitted)
+    path = sys.modules["jaxsub.discrepancy.explain"]
+    said = lambda before, after, sound, *, freely: Luck(gain, 0.001, 1.0, 1.0, sound, freely)
+    for name, fake in {"luck": said, "sound": lambda *_: True, "told": lambda *_: True}.items():
+        monkeypatch.setattr(path, name, fake)
+    judged = Judged("named", [Named(0, old, 1.0, [], []), Named(1, new, 1.0, [], [])], 1e-9, [])
+    model, after = without_idle(trial, Model(None, None, None, ()), best, judged, [old])
+    assert asked == [[new]]
+    assert model is (best if kept else fewer)
+    assert [one.effect for one in after.named] == ([old, new] if kept else [new])
+    assert len(after.notes) == (0 if kept else 1)
