@@ -8,6 +8,7 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
+import jax
 import numpy as np
 from scipy import special
 
@@ -103,23 +104,25 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     weighed = promising(view, forces, np.asarray(mean))
     drawn = force_columns(view, [column for force in weighed for column in hats(view, force, FINE)])
     asked = [dataclasses.replace(p.disturbance, force=share * p.disturbance.force) for p in under for share in _SHARES]
-    found = _Weighed(Evidence.of(view, chosen.picked(columns) + drawn, asked), len(columns))
-    owners = _owners(weighed, len(columns), FINE)
-    values = [found.values(found.held, own) for own in owners]
+    # one force after the other: nobody asks for products of one's hats with another's
+    of = lambda own: jax.tree.map(lambda column: column[..., np.array(own)], drawn)
+    owned = [chosen.picked(columns) + of(own) for own in _owners(weighed, 0, FINE)]
+    every = [_Weighed(Evidence.of(view, own, asked), len(columns)) for own in owned]
+    values = [each.values(each.held) for each in every]
     best = int(np.argmax([np.max(each) for each in values]))
-    own, at, gain = owners[best], int(np.argmax(values[best])), np.max(values[best]) - found.before
-    trials = len(forces) * len(SCALES)
-    p_value = min(1.0, 0.5 * trials * float(special.chdtrc(1, 2.0 * max(0.0, float(gain)))))
+    found, at = every[best], int(np.argmax(values[best]))
+    gain = float(np.max(values[best])) - found.before
+    p_value = min(1.0, 0.5 * len(forces) * len(SCALES) * float(special.chdtrc(1, 2.0 * max(0.0, gain))))
     # how large it is is a number of the force, as probable before the data as others; so is which force it is
-    alone = float(np.max(found.values([], own))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
-    heights, explained = found.heights(at, own)
-    force, near = found.nearest(at, own, weighed[best], heights)
-    return Pattern(force, heights, near, p_value, found.predicts(own), alone, explained)
+    alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
+    heights, explained = found.heights(at)
+    force, near = found.nearest(at, weighed[best], heights)
+    return Pattern(force, heights, near, p_value, found.predicts(), alone, explained)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Weighed:
-    """Evidence of the chosen columns, which are the first `count`, and of hats."""
+    """Evidence of the chosen columns, which are the first `count`, and of one force's hats."""
 
     evidence: Evidence
     count: int
@@ -128,6 +131,11 @@ class _Weighed:
     def held(self) -> list[int]:
         """The chosen columns."""
         return list(range(self.count))
+
+    @property
+    def own(self) -> list[int]:
+        """The hats."""
+        return list(range(self.count, self.count + FINE))
 
     @property
     def samples(self) -> int:
@@ -139,36 +147,39 @@ class _Weighed:
         """Log evidence of what was chosen."""
         return self.evidence.best(self.held)[0]
 
-    def values(self, held: list[int], own: list[int]) -> np.ndarray:
-        """Log evidence with a force more than the columns `held`, under each disturbance."""
-        length = self.evidence.length[own]
-        return np.array([p.log_evidence(held) + smoothest(p, held, own, length).gain for p in self.evidence.products])
+    @property
+    def length(self) -> np.ndarray:
+        """(FINE,) of the hats' columns."""
+        return self.evidence.length[self.own]
 
-    def together(self, products: Products, own: list[int]) -> tuple[Products, np.ndarray]:
-        """Products of what was chosen and of the columns of a force's prior, and what hats these are made of."""
-        weights = smoothest(products, self.held, own, self.evidence.length[own]).weights
-        return products.mixed(self.held, own, weights), weights
+    def values(self, held: list[int]) -> np.ndarray:
+        """Log evidence with the force more than the columns `held`, under each disturbance."""
+        gain = lambda p: smoothest(p, held, self.own, self.length).gain
+        return np.array([p.log_evidence(held) + gain(p) for p in self.evidence.products])
 
-    def predicts(self, own: list[int]) -> bool:
+    def together(self, products: Products) -> tuple[Products, np.ndarray]:
+        """Products of what was chosen and of the columns of the force's prior, and what hats these are made of."""
+        weights = smoothest(products, self.held, self.own, self.length).weights
+        return products.mixed(self.held, self.own, weights), weights
+
+    def predicts(self) -> bool:
         """Whether parts of the recordings are better predicted with the force, each under what suits it."""
-        both = list(range(self.count + FINE))
         products = self.evidence.products
-        with_it = max(float(np.sum(self.together(p, own)[0].predicted(both))) for p in products)
+        with_it = max(float(np.sum(self.together(p)[0].predicted([*self.held, *self.own]))) for p in products)
         return with_it > max(float(np.sum(p.predicted(self.held))) for p in products)
 
-    def heights(self, at: int, own: list[int]) -> tuple[np.ndarray, float]:
+    def heights(self, at: int) -> tuple[np.ndarray, float]:
         """Of the force, and the share of what it and the chosen explain that the chosen explain alone."""
-        both, weights = self.together(self.evidence.products[at], own)
-        more = list(range(self.count, self.count + FINE))
-        gains = both.gains(self.held, [more])
+        both, weights = self.together(self.evidence.products[at])
+        gains = both.gains(self.held, [self.own])
         fall = both.fall(self.held)
         explained = fall / max(fall + float(gains.statistic[0]), 1e-300)
-        return weights @ gains.amplitudes[0] / self.evidence.length[own], float(np.clip(explained, 0.0, 1.0))
+        return weights @ gains.amplitudes[0] / self.length, float(np.clip(explained, 0.0, 1.0))
 
-    def nearest(self, at: int, own: list[int], force: SmoothForce, heights: np.ndarray) -> tuple[SmoothForce, float]:
+    def nearest(self, at: int, force: SmoothForce, heights: np.ndarray) -> tuple[SmoothForce, float]:
         """The force with the numbers that are nearest to `heights` along the motion, and how near they are."""
-        G, _ = self.evidence.products[at].remaining(self.held, own)
-        G = G * np.outer(self.evidence.length[own], self.evidence.length[own])
+        G, _ = self.evidence.products[at].remaining(self.held, self.own)
+        G = G * np.outer(self.length, self.length)
         C, told = coarse(), float(heights @ G @ heights)
         # knots where nothing moved follow their neighbours' heights
         G = G + _ROUNDING * float(np.trace(G)) * np.eye(FINE)

@@ -210,6 +210,8 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
         # a fit has found the best shape of its effect: other shapes of it would end there too
         fallen = {effects[key[0]].label for key in tries.models if len(key) == 1}
         found.selector.usable[[effect.label in fallen for effect in effects]] = False
+    # a twin stands where a free run asked for the other, and so beside the same rivals
+    found.selector.freely.update(kept if freely else ())
     named = standing(found.selector, [*kept], refused)
     stand = [refitted(one, [(effects[i], value) for i, value in kept[one.number]]) for one in named]
     return tries.model([*kept]), settled(judged, stand)
