@@ -65,13 +65,18 @@ def explained(
     nothing more is named, and that the motion predicts, is modelled by a force without a name.
     """
     best, judged, refusals = baseline, NOTHING, 0
+    dropped: set[str] = set()
     while True:
         said, after = judge(found.naming, found.pattern, found.memory), None
         chosen = worth_trying(found, said)
         if chosen:
-            older, (best, said) = best.added, tried(trial, best, found, chosen, said)
+            # what was left out once and is asked for again stays: it would come and go
+            older = [effect for effect in best.added if effect.label not in dropped]
+            best, said = tried(trial, best, found, chosen, said)
             judged = both(judged, said)
-            best, judged = without_idle(trial, baseline, best, judged, older if said.named else ())
+            if said.named:
+                best, judged = without_idle(trial, baseline, best, judged, older)
+                dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
         else:
             best, said, after = after_all(trial, best, found, said, vocabulary)
             judged = both(judged, said)

@@ -90,7 +90,10 @@ class Trial:
 
 
 class Tries:
-    """Models with some of the candidates of one look at the recordings, by number, each fitted once."""
+    """Models with some of the candidates of one look at the recordings, by number, each fitted once.
+
+    `freely` says whether it was a free run that asked for them, which then judges them.
+    """
 
     def __init__(self, trial: Trial, base: Model, found: Found, freely: bool):
         self.trial, self.found, self.freely = trial, found, freely

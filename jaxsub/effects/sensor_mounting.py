@@ -35,11 +35,12 @@ class _Mounting(AbstractInstrument):
 
 
 class SensorMisalignment(_Mounting):
-    r"""A sensor that is turned in its mounting and so sees something of another axis: $z = y + \varepsilon\,y_{other}$.
+    r"""A sensor turned towards another axis in its mounting: $z = y\cos\varepsilon + y_{other}\sin\varepsilon$.
 
-    $\varepsilon$ in rad, of either sign, small. An instrument turned about one axis shows it in the other two:
-    $z = y + y\times\varepsilon$, in `q,r` that see `r,q`: $z_q = q + \varepsilon r$, $z_r = r - \varepsilon q$. Of an
-    attitude it is a bias, which is another effect. Source: Titterton and Weston (2004), §4; Groves (2013), §4.4.
+    $\varepsilon$ in rad, of either sign; an amplitude while small. An instrument turned about one axis shows it in
+    the other two, in `q,r` that see `r,q`: $z_q = q\cos\varepsilon + r\sin\varepsilon$,
+    $z_r = r\cos\varepsilon - q\sin\varepsilon$. Of an attitude it is a bias, which is another effect.
+    Source: Titterton and Weston (2004), §4; Groves (2013), §4.4.
     """
 
     name: ClassVar[str] = "sensor-misalignment"
@@ -71,15 +72,17 @@ class SensorMisalignment(_Mounting):
 
     @property
     def expression(self) -> str:
-        """The cross-talk."""
-        return ", ".join(f"{c} measured = {c} {'-+'[sign > 0]} ε {other}" for c, other, sign in self._pairs())
+        """The turned axes."""
+        said = lambda c, other, sign: f"{c} measured = {c} cos ε {'-+'[sign > 0]} {other} sin ε"
+        return ", ".join(said(*pair) for pair in self._pairs())
 
     def show(
         self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
     ) -> dict[str, Float[Array, " *k"]]:
-        """The outputs with a little of the other axis."""
+        """The outputs along the turned axes."""
         true = {velocity: motion.rates[equation] for velocity, equation in _EQUATIONS.items()} | dict(outputs)
-        return {c: jnp.asarray(outputs[c] + sign * self.epsilon * true[other]) for c, other, sign in self._pairs()}
+        own, across = jnp.cos(self.epsilon), jnp.sin(self.epsilon)
+        return {c: jnp.asarray(own * outputs[c] + sign * across * true[other]) for c, other, sign in self._pairs()}
 
     def _pairs(self) -> list[tuple[str, str, float]]:
         """Each channel, what it sees, and the sign."""

@@ -63,20 +63,21 @@ def test_rectification_is_suspected_only_of_what_may_be_negative():
 
 
 def test_a_turned_sensor_sees_the_other_axis():
-    epsilon = jnp.asarray(0.03)
-    np.testing.assert_allclose(read(SensorMisalignment("r", "p", epsilon)), TRUTH["r"] + 0.03 * NOW.rates["roll"])
-    np.testing.assert_allclose(read(SensorMisalignment("ax", "az", epsilon)), TRUTH["ax"] + 0.03 * TRUTH["az"])
+    turned = lambda own, other: np.cos(0.6) * own + np.sin(0.6) * other
+    epsilon = jnp.asarray(0.6)
+    np.testing.assert_allclose(read(SensorMisalignment("r", "p", epsilon)), turned(TRUTH["r"], NOW.rates["roll"]))
+    np.testing.assert_allclose(read(SensorMisalignment("ax", "az", epsilon)), turned(TRUTH["ax"], TRUTH["az"]))
     pairs = {(e.channel, e.sees) for e in SensorMisalignment.candidates(BODY)}
     # nothing records the other two specific forces
     assert pairs == {("u", "v"), ("u", "w"), ("r", "p"), ("r", "q")}
 
 
-def test_a_gyro_turned_about_an_axis_errs_by_the_rate_across_that_axis():
+def test_a_gyro_turned_about_an_axis_shows_the_rate_in_the_turned_frame():
     turning = rows(EQUATIONS[3:], NOW.rates)
     truth = TRUTH | dict(zip("pqr", turning.T, strict=True))
     for axis, (own, others) in enumerate((("q,r", "r,q"), ("r,p", "p,r"), ("p,q", "q,p"))):
-        found = read(SensorMisalignment(own, others, jnp.asarray(0.03)), truth=truth)
-        expected = turning + np.cross(turning, 0.03 * np.eye(3)[axis])
+        found = read(SensorMisalignment(own, others, jnp.asarray(0.6)), truth=truth)
+        expected = Rotation.from_rotvec(0.6 * np.eye(3)[axis]).inv().apply(turning)
         for channel, shown in found.items():
             np.testing.assert_allclose(shown, expected[:, "pqr".index(channel)], rtol=1e-12)
 
