@@ -223,16 +223,19 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
 def worth_trying(found: Found, judged: Judged) -> list[int]:
     """By number what was named, or, where nothing was, what rules a free run unless it is something without a name.
 
-    A force that leaves so much less of a free run's errors shows that the ruling effect is not their cause.
+    A force that leaves so much less of a free run's errors shows that the ruling effect is not their cause, and one
+    that leaves any less where the effect was not among those chosen.
     """
+    numbers = [one.number for one in found.naming.named]
     if judged.named:
-        return [one.number for one in found.naming.named]
+        return numbers
     selector = found.selector
     ruling = selector.ruling()
     if ruling is None:
         return []
     left = 1.0 - selector.of_free_run([])[ruling]
-    if left > _MUCH_LESS * (1.0 - most_explained(found.view, selector.free.disturbance)):
+    less = _MUCH_LESS if ruling in numbers else 1.0
+    if left > less * (1.0 - most_explained(found.view, selector.free.disturbance)):
         return []
     selector.freely.add(ruling)
     return [ruling]

@@ -12,7 +12,7 @@ from jaxsub.discrepancy.explain import without_idle
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.selector import Scan, Selector
 from jaxsub.discrepancy.show import Luck
-from jaxsub.discrepancy.trial import Model, Trial
+from jaxsub.discrepancy.trial import Found, Model, Trial, worth_trying
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.likelihood import Disturbance
@@ -103,3 +103,20 @@ def test_what_stood_in_for_a_later_effect_is_left_out(monkeypatch, gain, kept):
     assert model is (best if kept else fewer)
     assert [one.effect for one in after.named] == ([old, new] if kept else [new])
     assert len(after.notes) == (0 if kept else 1)
+
+
+@pytest.mark.parametrize(
+    ("nameless", "chosen", "expected"), [(0.3, [], [1]), (0.8, [], []), (0.8, [1], [1]), (0.95, [1], [])]
+)
+def test_what_rules_gives_way_to_a_force_without_a_name(monkeypatch, nameless, chosen, expected):
+    """Claim: of 0.7 of a free run, to one that explains any more where it was not chosen, else to one much nearer."""
+    path = sys.modules["jaxsub.discrepancy.trial"]
+    monkeypatch.setattr(path, "most_explained", lambda *_: nameless)
+    asked = Freely(0.1, 0.7)
+    asked.ruling, asked.free = lambda: 1, SimpleNamespace(disturbance=None)
+    found = object.__new__(Found)
+    named = SimpleNamespace(named=[SimpleNamespace(number=i) for i in chosen])
+    for part, value in {"naming": named, "selector": asked, "view": None}.items():
+        object.__setattr__(found, part, value)
+    assert worth_trying(found, Judged("unknown", [], 1e-9, [])) == expected
+    assert asked.freely == {*expected}
