@@ -142,13 +142,13 @@ class Selector:
         p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
         return (scan.value > self.value(chosen)) & (p_values < SIGNIFICANCE)
 
-    def ruling(self) -> int | None:
-        """Which candidate alone explains most of a free run's errors, where they are much larger than the noise."""
+    def ruling(self, among: Sequence[int]) -> int | None:
+        """Which of some candidates alone explains most of a free run's errors, where they are far above the noise."""
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
         share = np.where(self._asked([], self.scan([])), self.of_free_run([]), 0.0)
-        best = int(np.argmax(share))
+        best = max(among, key=lambda i: share[i], default=None)
         large = self.free.gram[0, 0] > _LARGE * noise * self.free.samples
-        return best if large and share[best] > _MUCH else None
+        return best if best is not None and large and share[best] > _MUCH else None
 
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate may stand where `index` does, on top of `chosen`.

@@ -223,22 +223,20 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
 def worth_trying(found: Found, judged: Judged) -> list[int]:
     """By number what was named, or, where nothing was, what rules a free run unless it is something without a name.
 
-    A force that leaves so much less of a free run's errors shows that the ruling effect is not their cause, and one
-    that leaves any less where the effect was not among those chosen.
+    Of those chosen, or else of all that the recordings ask for. A force that leaves so much less of a free run's errors
+    shows that the ruling effect is not their cause, and where it was not chosen one that leaves any less.
     """
     numbers = [one.number for one in found.naming.named]
     if judged.named:
         return numbers
     selector = found.selector
-    ruling = selector.ruling()
-    if ruling is None:
-        return []
-    left = 1.0 - selector.of_free_run([])[ruling]
-    less = _MUCH_LESS if ruling in numbers else 1.0
-    if left > less * (1.0 - most_explained(found.view, selector.free.disturbance)):
-        return []
-    selector.freely.add(ruling)
-    return [ruling]
+    left = 1.0 - selector.of_free_run([])
+    for among, less in ((numbers, _MUCH_LESS), (range(len(left)), 1.0)):
+        ruling = selector.ruling(among)
+        if ruling is not None and left[ruling] <= less * (1.0 - most_explained(found.view, selector.free.disturbance)):
+            selector.freely.add(ruling)
+            return [ruling]
+    return []
 
 
 def as_well_known(base: Model, more: Model) -> bool:
