@@ -69,17 +69,16 @@ def explained(
     while True:
         said, after = judge(found.naming, found.pattern, found.memory), None
         chosen = worth_trying(found, said)
+        # what was left out once and is asked for again stays: it would come and go
+        older = [effect for effect in best.added if effect.label not in dropped]
         if chosen:
-            # what was left out once and is asked for again stays: it would come and go
-            older = [effect for effect in best.added if effect.label not in dropped]
             best, said = tried(trial, best, found, chosen, said)
-            judged = both(judged, said)
-            if said.named:
-                best, judged = without_idle(trial, baseline, best, judged, older)
-                dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
         else:
             best, said, after = after_all(trial, best, found, said, vocabulary)
-            judged = both(judged, said)
+        judged = both(judged, said)
+        if chosen and said.named:
+            best, judged = without_idle(trial, baseline, best, judged, older)
+            dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
         if chosen and said.verdict == "unknown" and refusals < _REFUSALS:
             refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
         if after is None and not said.named:

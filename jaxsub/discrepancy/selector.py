@@ -142,13 +142,16 @@ class Selector:
         p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
         return (scan.value > self.value(chosen)) & (p_values < SIGNIFICANCE)
 
-    def ruling(self, among: Sequence[int]) -> int | None:
-        """Which of some candidates alone explains most of a free run's errors, where they are far above the noise."""
+    def ruling(self) -> np.ndarray:
+        """(m,) the share of a free run's errors, far above the noise, that each candidate alone explains.
+
+        0 where it is not most of them, or where the recordings do not ask for the candidate.
+        """
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
-        share = np.where(self._asked([], self.scan([])), self.of_free_run([]), 0.0)
-        best = max(among, key=lambda i: share[i], default=None)
-        large = self.free.gram[0, 0] > _LARGE * noise * self.free.samples
-        return best if best is not None and large and share[best] > _MUCH else None
+        share = self.of_free_run([])
+        if not self.free.gram[0, 0] > _LARGE * noise * self.free.samples:
+            return np.zeros_like(share)
+        return np.where((share > _MUCH) & self._asked([], self.scan([])), share, 0.0)
 
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate may stand where `index` does, on top of `chosen`.

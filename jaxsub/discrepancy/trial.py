@@ -230,12 +230,15 @@ def worth_trying(found: Found, judged: Judged) -> list[int]:
     if judged.named:
         return numbers
     selector = found.selector
-    left = 1.0 - selector.of_free_run([])
-    for among, less in ((numbers, _MUCH_LESS), (range(len(left)), 1.0)):
-        ruling = selector.ruling(among)
-        if ruling is not None and left[ruling] <= less * (1.0 - most_explained(found.view, selector.free.disturbance)):
-            selector.freely.add(ruling)
-            return [ruling]
+    share = selector.ruling()
+    if not np.any(share):
+        return []
+    nameless = 1.0 - most_explained(found.view, selector.free.disturbance)
+    for among, less in ((numbers, _MUCH_LESS), (range(len(share)), 1.0)):
+        best = max(among, key=lambda i: share[i], default=None)
+        if best is not None and share[best] > 0.0 and 1.0 - share[best] <= less * nameless:
+            selector.freely.add(best)
+            return [best]
     return []
 
 

@@ -19,7 +19,7 @@ from jaxsub.likelihood import Disturbance
 
 
 class Freely(Selector):
-    """What `foremost` and `stand_in` ask of a selector: shares of a free run's errors, which are given."""
+    """What `foremost`, `stand_in` and `ruling` ask of a selector: shares of a free run's errors, which are given."""
 
     def __init__(self, *shares):
         self.candidates, self.freely = [None] * len(shares), set()
@@ -77,7 +77,8 @@ def test_what_rules_a_free_run_need_not_be_what_was_chosen_sample_by_sample():
         asked.evidence = SimpleNamespace(view=SimpleNamespace(disturbance=SimpleNamespace(noise=np.ones(2))))
         asked.free = SimpleNamespace(gram=np.array([[gram]]), samples=10)
         asked.scan = lambda chosen: gains(*values)
-        return asked.ruling(range(3))
+        share = asked.ruling()
+        return int(np.argmax(share)) if np.any(share) else None
 
     assert ruling(50.0, (137.0, 27.0, -1.0), 0.1, 0.54, 0.9) == 1
     assert ruling(50.0, (137.0, 27.0, -1.0), 0.1, 0.4, 0.9) is None
@@ -113,7 +114,7 @@ def test_what_rules_gives_way_to_a_force_without_a_name(monkeypatch, nameless, c
     path = sys.modules["jaxsub.discrepancy.trial"]
     monkeypatch.setattr(path, "most_explained", lambda *_: nameless)
     asked = Freely(0.1, 0.7)
-    asked.ruling, asked.free = lambda among: 1 if 1 in among else None, SimpleNamespace(disturbance=None)
+    asked.ruling, asked.free = lambda: np.array([0.0, 0.7]), SimpleNamespace(disturbance=None)
     found = object.__new__(Found)
     named = SimpleNamespace(named=[SimpleNamespace(number=i) for i in chosen])
     for part, value in {"naming": named, "selector": asked, "view": None}.items():
