@@ -131,10 +131,15 @@ def _respond(effect: AbstractActuator, times: Array, nodes: Array) -> Array:
 def plausible(view: View, effect: AbstractEffect) -> bool:
     """Whether a sensor's error is smaller than what the sensor shows: a larger one is no sensor error but a way out.
 
-    Of what it should show and what was measured, whichever is more: on a long arm a log feels mostly the turning.
+    Of what it should show and what was measured, whichever is more. Not so on an arm within its reach: there a log
+    feels mostly the turning, and a model that followed it believes that the vehicle moved so.
     """
     if not isinstance(effect, AbstractInstrument):
         return True
+    if effect.reach is not None:
+        return all(
+            abs(numbers(effect)[name]) <= effect.reach * view.vehicle.layout.length for name in amplitudes(effect)
+        )
 
     def shown(channel: str) -> float:
         measured = view.measured(channel)

@@ -36,6 +36,8 @@ _SHARES = (1.0, 0.5)
 _TURNS, _SETTLED = 8, 0.5
 # rms over sigma of a channel, above which a fit is not trusted to have ended near the truth
 _MUCH = 2.0
+# of the channels that may alone be wrong, those that are tried
+_DOUBTED = 3
 # of the forces that would explain all that is left: too small to lead a path, and large enough to grow from
 _QUIET = 1e-2
 _LEAST_WHITE = 1e-5
@@ -124,11 +126,14 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     led = _Led(fit, fit.problem)
     system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
-    vehicles, starts = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]]
+    vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
     if max(fit.rms.values()) > _MUCH:
         vehicles += [file] if file is not None else []
         starts.append([_in_sensors(guess, fit)])
-    searches = [_by_cost(led.at(v, start) for start in some)[0] for v in vehicles for some in starts]
+        doubted = _doubting_one(guess, fit)
+    best = lambda pairs: _by_cost(led.at(*pair) for pair in pairs)[0]
+    searches = [best([(v, start) for start in some]) for v in vehicles for some in starts]
+    searches += _by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
     while len(searches) > 1:
         searches = _by_cost(_turned(led, at) for at in searches)[: len(searches) // 2]
     at = _settled(led, searches[0])
@@ -158,8 +163,19 @@ def _settled(led: "_Led", at: "_At") -> "_At":
 
 def _in_sensors(guess: Disturbance, fit: Fit) -> Disturbance:
     """What a fit leaves, put down to the noise of each channel."""
-    rms = jnp.asarray([fit.rms[channel] for channel in fit.vehicle.layout.channels])
-    return Disturbance(_QUIET * guess.force, guess.time, jnp.maximum(guess.noise, rms))
+    return Disturbance(_QUIET * guess.force, guess.time, jnp.maximum(guess.noise, _rms(fit)))
+
+
+def _doubting_one(guess: Disturbance, fit: Fit) -> list[Disturbance]:
+    """What a fit leaves in one channel put down to its noise, and in the others to forces: for each channel."""
+    noisy = np.asarray(jnp.maximum(guess.noise, _rms(fit)))
+    return [
+        dataclasses.replace(guess, noise=jnp.where(own, noisy, guess.noise)) for own in np.eye(len(noisy), dtype=bool)
+    ]
+
+
+def _rms(fit: Fit) -> Array:
+    return jnp.asarray([fit.rms[channel] for channel in fit.vehicle.layout.channels])
 
 
 def _white(fit: Fit) -> Array:

@@ -137,7 +137,12 @@ class AbstractCurve(AbstractActuator):
 
 
 class AbstractInstrument(AbstractEffect):
-    """An effect that stands between true outputs and what an instrument of one or more channels records of them."""
+    """An effect that stands between true outputs and what an instrument of one or more channels records of them.
+
+    `reach` is how many times the vehicle's length its amplitude may be, where it is a distance.
+    """
+
+    reach: ClassVar[float | None] = None
 
     @property
     @abc.abstractmethod

@@ -100,6 +100,8 @@ class SensorLeverArm(_Mounting):
 
     name: ClassVar[str] = "sensor-lever-arm"
     family: ClassVar[str] = "sensors"
+    # from one end to the other, and as much again beyond it
+    reach: ClassVar[float | None] = 2.0
     channel: str = eqx.field(static=True)
     axis: str = eqx.field(static=True)
     arm: Array = amplitude("m")

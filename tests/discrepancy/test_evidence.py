@@ -11,7 +11,7 @@ from jax import Array
 from scipy import stats
 
 from jaxsub.discrepancy import batch
-from jaxsub.discrepancy.columns import candidate_columns
+from jaxsub.discrepancy.columns import candidate_columns, plausible, sensor_changes
 from jaxsub.discrepancy.evidence import Evidence, Products, evidence_of
 from jaxsub.discrepancy.locate import effect_shares
 from jaxsub.discrepancy.model import sound
@@ -20,6 +20,7 @@ from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.view import facts, look
 from jaxsub.effects import AbstractInstrument, FluidMemory, amplitude, candidates
 from jaxsub.effects.hull import CrossflowDrag
+from jaxsub.effects.sensor_mounting import SensorLeverArm
 from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import fit
 from jaxsub.likelihood import Disturbance, whitened
@@ -121,6 +122,16 @@ def test_wrong_scale_of_the_noise_raises_no_alarm():
     chosen, _, p_values = select(Selector(Evidence.of(view, columns), tried, owners, {}), lambda message: None)
     assert chosen == [] and p_values[0] > 0.01
     assert jnp.isfinite(view.covariance).all()
+
+
+def test_a_sensor_errs_by_less_than_it_shows_and_an_arm_is_no_longer_than_its_reach(clean):
+    """Claim: a scale error of 90 % may be and one of 110 % not; an arm of two lengths whatever it adds, no longer."""
+    assert plausible(clean, SensorScale("w", -0.9))
+    assert not plausible(clean, SensorScale("w", -1.1))
+    within = SensorLeverArm("w", "x", jnp.asarray(2.0 * clean.vehicle.layout.length))
+    assert np.ptp(sensor_changes(clean.path, within)["w"]) > np.ptp(clean.measured("w"))
+    assert plausible(clean, within)
+    assert not plausible(clean, SensorLeverArm("w", "x", jnp.asarray(2.1 * clean.vehicle.layout.length)))
 
 
 class Gain(AbstractInstrument):
