@@ -1,5 +1,6 @@
 """What every test starts from: 64-bit numbers, annotated shapes checked at each call, compiled code kept."""
 
+import os
 from collections.abc import Iterator
 
 import jax
@@ -13,6 +14,9 @@ settings.load_profile("seeded")
 jax.config.update("jax_enable_x64", True)
 # Most of the suite's time is compilation of programs that run once.
 jax.config.update("jax_disable_most_optimizations", True)
+# jax 0.10 compiles in half the time without this; later ones end the process at a flag that they do not know
+if jax.__version_info__[:2] == (0, 10):
+    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --xla_cpu_use_fusion_emitters=false"
 # Before any test imports jaxsub, since only modules imported later are checked.
 jaxtyping.install_import_hook("jaxsub", "typechecking.checked")
 

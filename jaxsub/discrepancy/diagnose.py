@@ -56,7 +56,7 @@ def diagnose(
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
     progress("free runs through what the fit did not see")
-    trial = Trial(runs, range(size, size + len(held)), size, start.sigma, progress)
+    trial = Trial(runs, range(size, size + len(held)), size, start.sigma, progress, vehicle)
     baseline = Model(start, found.view, trial.held_out(start, found.view.disturbance), ())
     best, judged = explained(trial, baseline, found, vocabulary)
     return _told(vehicle, train, held, found, field, baseline, best, judged)

@@ -11,30 +11,44 @@ from ..estimate import Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .selector import SIGNIFICANCE
-from .view import View
+from .view import MUCH, View
 
 # a shape such as a lag at which its effect is gone
 _VANISHED = 1e-6
 
 
-def join(view: View, fit: Fit, effects: Sequence[AbstractEffect]) -> Fit:
+def join(view: View, fit: Fit, effects: Sequence[AbstractEffect], file: AbstractVehicle) -> Fit:
     """The vehicle of `fit` with `effects` more, fitted again as it runs free: what it will be used for.
 
     The search begins at what innovations say of all numbers, and where that does not run from the effects' predicted
-    sizes or a tenth of them.
+    sizes or a tenth of them. Where it leaves much, it begins at the numbers of the `file` too: those of a fit that had
+    to do without the effects may lie where nothing leads back, such as a rudder that steers the other way.
     """
     led = view.vehicle
-    starts = [joined(led, effects, 1.0), joined(fit.vehicle, effects, 1.0), joined(fit.vehicle, effects, 0.1)]
     best = None
-    for vehicle in starts:
-        found = search(vehicle, fit.runs, sigma=fit.sigma)
-        if best is None or float(found[3]) < float(best[3]) or not np.isfinite(float(best[3])):
+    for start in (joined(led, effects, 1.0), joined(fit.vehicle, effects, 1.0), joined(fit.vehicle, effects, 0.1)):
+        found = _searched(fit, start)
+        if best is None or not _worse(found, best):
             best = found
-        if float(best[3]) < float(fit.cost):
+        if float(best.cost) < float(fit.cost):
             break
     assert best is not None
-    vehicle, start, sigma, cost, steps, result = best
-    return evaluate(vehicle, fit.runs, start, sigma, cost=cost, steps=steps, result=result)
+    if max(best.rms.values()) < MUCH:
+        return best
+    listed = {effect.label for effect in file.effects}
+    earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
+    found = _searched(fit, joined(file, [*earlier, *effects], 1.0))
+    return best if _worse(found, best) else found
+
+
+def _searched(fit: Fit, start: AbstractVehicle) -> Fit:
+    """The fit of `start` to the runs of a fit."""
+    vehicle, states, sigma, cost, steps, result = search(start, fit.runs, sigma=fit.sigma)
+    return evaluate(vehicle, fit.runs, states, sigma, cost=cost, steps=steps, result=result)
+
+
+def _worse(one: Fit, other: Fit) -> bool:
+    return not float(one.cost) < float(other.cost) and bool(np.isfinite(float(other.cost)))
 
 
 def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: float) -> AbstractVehicle:

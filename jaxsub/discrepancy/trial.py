@@ -11,6 +11,7 @@ from ..effects import AbstractEffect
 from ..estimate import Fit
 from ..likelihood import Disturbance
 from ..recording.runs import Runs
+from ..vehicle import AbstractVehicle
 from .evidence import evidence_of
 from .generic import Pattern, most_explained
 from .model import allowing_for, join, p_value, sound, told
@@ -68,19 +69,23 @@ class Model(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """The runs that no fit saw: numbers `chosen` of `runs`, of which the first `size` were fitted."""
+    """The runs that no fit saw: numbers `chosen` of `runs`, of which the first `size` were fitted.
+
+    `file` is the vehicle as its user describes it.
+    """
 
     runs: Runs
     chosen: Sequence[int]
     size: int
     sigma: Array
     progress: Progress
+    file: AbstractVehicle
 
     def with_effects(self, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance) -> Model:
         """A model with `effects` more, fitted again and tried; the `disturbance` is where one may look for its own."""
         make_room()
         self.progress(f"fitting with {', '.join(effect.label for effect in effects)}")
-        joined = join(model.view, model.fit, effects)
+        joined = join(model.view, model.fit, effects, self.file)
         view = look(joined, disturbance)
         return Model(joined, view, self.held_out(joined, view.disturbance), (*model.added, *effects))
 

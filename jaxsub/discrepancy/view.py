@@ -35,7 +35,7 @@ _SHARES = (1.0, 0.5)
 # disturbance and numbers are sought in turns until the log likelihood changes by less
 _TURNS, _SETTLED = 8, 0.5
 # rms over sigma of a channel, above which a fit is not trusted to have ended near the truth
-_MUCH = 2.0
+MUCH = 2.0
 # of the channels that may alone be wrong, those that are tried
 _DOUBTED = 3
 # of the forces that would explain all that is left: too small to lead a path, and large enough to grow from
@@ -127,7 +127,7 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
-    if max(fit.rms.values()) > _MUCH:
+    if max(fit.rms.values()) > MUCH:
         vehicles += [file] if file is not None else []
         starts.append([_in_sensors(guess, fit)])
         doubted = _doubting_one(guess, fit)
