@@ -14,7 +14,7 @@ from experiments.next_manoeuvre.cases import case
 from jaxsub.cli.session import load_runs
 from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.explain import after_all
-from jaxsub.discrepancy.model import told
+from jaxsub.discrepancy.model import join, told
 from jaxsub.discrepancy.name import Named, named_on, refitted
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.show import Luck
@@ -55,18 +55,33 @@ def test_probabilities_of_twins_are_those_of_their_fits_and_others_keep_theirs()
     assert refitted(named, [(cubic, -1.0)]) == named
 
 
+def astray(runs, share, *names):
+    """A fit that ended with `share` of the file's numbers of those `names`."""
+    values = wrong().values()
+    sigma = jnp.array([output.sigma for output in wrong().layout.outputs])
+    start, ended = Problem.of(wrong(), runs, sigma).guess, {"cost": jnp.asarray(1e6), "steps": jnp.asarray(0)}
+    gone = wrong().with_values({name: share * values[name] for name in names})
+    return evaluate(gone, runs, start, sigma, **ended, result=RESULTS.successful)
+
+
 def test_a_fit_that_went_astray_is_looked_at_from_the_file_too():
     """Claim: from numbers that a fit might have run away to, with their signs turned, the file's lead back."""
-    runs = batch(wrong(), recorded(None, 2)[:2])
-    values = wrong().values()
-    turned = {row.name: -20.0 * values[row.name] for row in wrong().layout.free if row.name in ("Z_q", "M_w")}
-    sigma = jnp.array([output.sigma for output in wrong().layout.outputs])
-    start, ended = Problem.of(wrong(), runs, sigma).guess, {"cost": jnp.asarray(0.0), "steps": jnp.asarray(0)}
-    gone = evaluate(wrong().with_values(turned), runs, start, sigma, **ended, result=RESULTS.successful)
+    gone = astray(batch(wrong(), recorded(None, 2)[:2]), -20.0, "Z_q", "M_w")
     assert max(gone.rms.values()) > 2.0
     found = look(gone, file=wrong()).vehicle.values()
     for row in wrong().layout.free:
         assert float(found[row.name]) == pytest.approx(float(dsrv().values()[row.name]), rel=0.2), row.name
+
+
+def test_a_fit_with_more_effects_is_sought_from_the_file_too():
+    """Claim: where a fit went astray its own numbers do not lead to the effect that it lacked, and the file's do."""
+    runs = batch(wrong(), recorded(SensorScale("q", 0.05), 2)[:2])
+    gone = astray(runs, -1.0, "M_delta_s", "M_q", "M_w")
+    view, effects = look(gone), [SensorScale("q", 0.02)]
+    assert max(join(view, gone, effects, gone.vehicle).rms.values()) > 2.0
+    found = join(view, gone, effects, wrong())
+    assert max(found.rms.values()) < 1.1
+    assert float(found.vehicle.values()["sensor-scale[q].scale"]) == pytest.approx(0.05, rel=0.2)
 
 
 @pytest.mark.long
