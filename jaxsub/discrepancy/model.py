@@ -11,7 +11,7 @@ from ..estimate import Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .selector import SIGNIFICANCE
-from .view import MUCH, View
+from .view import View, by_cost, leaves_much
 
 # a shape such as a lag at which its effect is gone
 _VANISHED = 1e-6
@@ -24,31 +24,23 @@ def join(view: View, fit: Fit, effects: Sequence[AbstractEffect], file: Abstract
     sizes or a tenth of them. Where it leaves much, it begins at the numbers of the `file` too: those of a fit that had
     to do without the effects may lie where nothing leads back, such as a rudder that steers the other way.
     """
-    led = view.vehicle
-    best = None
-    for start in (joined(led, effects, 1.0), joined(fit.vehicle, effects, 1.0), joined(fit.vehicle, effects, 0.1)):
-        found = _searched(fit, start)
-        if best is None or not _worse(found, best):
-            best = found
-        if float(best.cost) < float(fit.cost):
+    fits: list[Fit] = []
+    for vehicle, share in ((view.vehicle, 1.0), (fit.vehicle, 1.0), (fit.vehicle, 0.1)):
+        fits.append(_searched(fit, joined(vehicle, effects, share)))
+        if float(fits[-1].cost) < float(fit.cost):
             break
-    assert best is not None
-    if max(best.rms.values()) < MUCH:
+    best = by_cost(fits)[0]
+    if np.isfinite(float(best.cost)) and not leaves_much(best):
         return best
     listed = {effect.label for effect in file.effects}
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
-    found = _searched(fit, joined(file, [*earlier, *effects], 1.0))
-    return best if _worse(found, best) else found
+    return by_cost([best, _searched(fit, joined(file, [*earlier, *effects], 1.0))])[0]
 
 
 def _searched(fit: Fit, start: AbstractVehicle) -> Fit:
     """The fit of `start` to the runs of a fit."""
     vehicle, states, sigma, cost, steps, result = search(start, fit.runs, sigma=fit.sigma)
     return evaluate(vehicle, fit.runs, states, sigma, cost=cost, steps=steps, result=result)
-
-
-def _worse(one: Fit, other: Fit) -> bool:
-    return not float(one.cost) < float(other.cost) and bool(np.isfinite(float(other.cost)))
 
 
 def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: float) -> AbstractVehicle:

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Iterable
 from functools import cached_property
+from typing import TypeVar
 
 import equinox as eqx
 import jax
@@ -35,7 +36,7 @@ _SHARES = (1.0, 0.5)
 # disturbance and numbers are sought in turns until the log likelihood changes by less
 _TURNS, _SETTLED = 8, 0.5
 # rms over sigma of a channel, above which a fit is not trusted to have ended near the truth
-MUCH = 2.0
+_MUCH = 2.0
 # of the channels that may alone be wrong, those that are tried
 _DOUBTED = 3
 # of the forces that would explain all that is left: too small to lead a path, and large enough to grow from
@@ -83,6 +84,9 @@ def _trajectory(vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered:
     return start, end, seen, true, nodes
 
 
+_Costed = TypeVar("_Costed", Fit, "_At")
+
+
 @dataclasses.dataclass(frozen=True)
 class View:
     """A model as its recordings lead it.
@@ -127,23 +131,29 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
-    if max(fit.rms.values()) > MUCH:
+    if leaves_much(fit):
         vehicles += [file] if file is not None else []
         starts.append([_in_sensors(guess, fit)])
         doubted = _doubting_one(guess, fit)
-    best = lambda pairs: _by_cost(led.at(*pair) for pair in pairs)[0]
+    best = lambda pairs: by_cost(led.at(*pair) for pair in pairs)[0]
     searches = [best([(v, start) for start in some]) for v in vehicles for some in starts]
-    searches += _by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
+    searches += by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
     while len(searches) > 1:
-        searches = _by_cost(_turned(led, at) for at in searches)[: len(searches) // 2]
+        searches = by_cost(_turned(led, at) for at in searches)[: len(searches) // 2]
     at = _settled(led, searches[0])
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
     return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
-def _by_cost(found: Iterable["_At"]) -> list["_At"]:
-    return sorted(found, key=lambda at: at.cost if np.isfinite(at.cost) else np.inf)
+def leaves_much(fit: Fit) -> bool:
+    """Whether a fit leaves so much in some channel that it is not to be trusted to have ended near the truth."""
+    return max(fit.rms.values()) > _MUCH
+
+
+def by_cost(found: Iterable[_Costed]) -> list[_Costed]:
+    """Those of the least `cost` first, and what has no finite one last."""
+    return sorted(found, key=lambda one: float(one.cost) if np.isfinite(float(one.cost)) else np.inf)
 
 
 def _turned(led: "_Led", at: "_At") -> "_At":
