@@ -32,7 +32,7 @@ def main(
     folder = chosen.out / "parts"
     folder.mkdir(parents=True, exist_ok=True)
     if chosen.part:
-        session.start()
+        session.start(long=True)
         begin = time.perf_counter()
         found = part(chosen.part, chosen.out, chosen.quick)
         found["part_seconds"] = time.perf_counter() - begin

@@ -46,7 +46,7 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
 
     With `overwrite` whatever is there goes, once everything else is found to be in order.
     """
-    session.start()
+    session.start(long=True)
     refuse_existing(out, True)
     plan = make_plan(asked)
     if overwrite:

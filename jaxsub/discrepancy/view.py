@@ -31,7 +31,7 @@ from ..vehicle import AbstractVehicle
 from .tones import tones
 from .whiteness import record_sigma
 
-# of a scoring step, tried one after the other
+# of a scoring step or of a change of the disturbance, tried one after the other
 _SHARES = (1.0, 0.5)
 # disturbance and numbers are sought in turns until the log likelihood changes by less
 _TURNS, _SETTLED = 8, 0.5
@@ -139,7 +139,8 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     searches = [best([(v, start) for start in some]) for v in vehicles for some in starts]
     searches += by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
     while len(searches) > 1:
-        searches = by_cost(_turned(led, at) for at in searches)[: len(searches) // 2]
+        searches = _apart(_turned(led, at) for at in searches)
+        searches = searches[: max(1, len(searches) // 2)]
     at = _settled(led, searches[0])
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
@@ -157,9 +158,26 @@ def by_cost(found: Iterable[_Costed]) -> list[_Costed]:
 
 
 def _turned(led: "_Led", at: "_At") -> "_At":
-    """The disturbance sought for the numbers, and the numbers under it."""
+    """The disturbance sought for the numbers, and the numbers under it; or half as far, or as it was, if that is worse.
+
+    It is sought along the path that the former disturbance led, and another may lead elsewhere.
+    """
     found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance)
-    return led.descend(at.vehicle, found)
+    for share in _SHARES:
+        between = lambda old, new, share=share: old * (new / old) ** share
+        after = led.descend(at.vehicle, jax.tree.map(between, at.disturbance, found))
+        if by_cost([at, after])[0] is after:
+            return after
+    return at
+
+
+def _apart(found: Iterable["_At"]) -> list["_At"]:
+    """By cost, one of those that came to the same place."""
+    apart: list[_At] = []
+    for at in by_cost(found):
+        if not apart or not abs(at.cost - apart[-1].cost) < _SETTLED:
+            apart.append(at)
+    return apart
 
 
 def _settled(led: "_Led", at: "_At") -> "_At":
@@ -177,11 +195,10 @@ def _in_sensors(guess: Disturbance, fit: Fit) -> Disturbance:
 
 
 def _doubting_one(guess: Disturbance, fit: Fit) -> list[Disturbance]:
-    """What a fit leaves in one channel put down to its noise, and in the others to forces: for each channel."""
-    noisy = np.asarray(jnp.maximum(guess.noise, _rms(fit)))
-    return [
-        dataclasses.replace(guess, noise=jnp.where(own, noisy, guess.noise)) for own in np.eye(len(noisy), dtype=bool)
-    ]
+    """What a fit leaves in one channel put down to its noise, and in the others to forces: each that leaves much."""
+    rms = np.asarray(_rms(fit))
+    noisy, doubtful = np.maximum(np.asarray(guess.noise), rms), np.diag(rms > _MUCH)
+    return [dataclasses.replace(guess, noise=jnp.where(own, noisy, guess.noise)) for own in doubtful if own.any()]
 
 
 def _rms(fit: Fit) -> Array:

@@ -22,7 +22,7 @@ OPTIONS = ["--starts", "1280", "--spread", "0.8"]
 def command(monkeypatch, capsys, *arguments):
     """The command in this process: its exit code and what it said."""
     monkeypatch.setattr("sys.argv", ["jaxsub", *arguments])
-    monkeypatch.setattr("jaxsub.cli.session.start", lambda: None)
+    monkeypatch.setattr("jaxsub.cli.session.start", lambda long: None)
     try:
         main()
         code = 0
