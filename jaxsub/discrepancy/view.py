@@ -124,11 +124,13 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
 
     Where a fit leaves much, several searches are begun and the better half goes on after each turn. Numbers are moved
     from those of the fit and from those of the `file`: a fit that has to do without the physics may end where nothing
-    leads back. And what is left is put down to forces at first, or to sensors: forces that follow a sensor which is
-    wrong make the right ones wrong.
+    leads back. Nor are its initial states to be trusted, and a filter begins at what is known before the fit. And what
+    is left is put down to forces at first, or to sensors: forces that follow a sensor which is wrong make the right
+    ones wrong.
     """
-    led = _Led(fit, fit.problem)
-    system = System.of(fit.model, fit.runs, fit.sigma, led.problem.spread)
+    problem = fit.problem
+    led = _Led(fit, problem, problem.guess if leaves_much(fit) else fit.start)
+    system = System.of(fit.model, fit.runs, fit.sigma, problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
     if leaves_much(fit):
@@ -244,15 +246,16 @@ class _At:
 
 @dataclasses.dataclass(frozen=True)
 class _Led:
-    """A fit's recordings, by which vehicles with other numbers are led."""
+    """A fit's recordings, by which vehicles with other numbers are led from initial states of mean `start`."""
 
     fit: Fit
     problem: Problem
+    start: Array
 
     def at(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> _At:
         """With the residual's and the parameters' columns in units in which each of the latter is of length one."""
         fit, problem = self.fit, self.problem
-        followed = follow(vehicle, fit.runs, fit.sigma, disturbance, fit.start, problem.spread)
+        followed = follow(vehicle, fit.runs, fit.sigma, disturbance, self.start, problem.spread)
         columns = followed.residual + followed.theta
         known = len(fit.names) + 1
         found, spread = products(disturbance, followed.system, columns, jnp.zeros((known, known)))

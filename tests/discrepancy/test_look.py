@@ -1,0 +1,51 @@
+"""How a model is led along its recordings, and which searches for its disturbance go on."""
+
+import dataclasses
+
+import pytest
+from diagnosis_cases import recorded, wrong
+
+from jaxsub.discrepancy import batch, view
+from jaxsub.discrepancy.evidence import evidence_of
+from jaxsub.discrepancy.view import look
+from jaxsub.effects.hull import HullAsymmetry
+from jaxsub.estimate import fit
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    """A fit to recordings that conceal a force."""
+    return fit(wrong(), batch(wrong(), recorded(HullAsymmetry("pitch", 3.0), 2)[:2]))
+
+
+def led_to(times):
+    """A search that ends at forces so many `times` larger than it began with."""
+    return lambda system, columns, prior, start: dataclasses.replace(start, force=times * start.force)
+
+
+def test_a_turn_leads_to_nothing_less_probable(fitted, monkeypatch):
+    """Claim: a search for the disturbance that ended far off changes nothing, and one half of whose way helps that."""
+    found = look(fitted)
+    monkeypatch.setattr(view, "estimate_disturbance", led_to(1.0))
+    still = evidence_of(look(fitted, found.disturbance))
+    monkeypatch.setattr(view, "estimate_disturbance", led_to(1e8))
+    assert evidence_of(look(fitted, found.disturbance)) > still - 0.5
+    # a hundred times too large at first, and a step of ten thousand down: all of it is too far, half is right
+    large = dataclasses.replace(found.disturbance, force=100.0 * found.disturbance.force)
+    monkeypatch.setattr(view, "first_guess", lambda system, residual: large)
+    monkeypatch.setattr(view, "estimate_disturbance", led_to(1e-4))
+    half = look(fitted)
+    assert float(half.disturbance.force[0] / found.disturbance.force[0]) == pytest.approx(1.0, rel=1e-6)
+
+
+def test_searches_that_agree_are_one():
+    """Claim: of searches that came to the same cost, or to none, one goes on, and the order is by cost."""
+
+    def at(cost):
+        made = object.__new__(view._At)
+        made.__dict__["cost"] = cost
+        return made
+
+    nan = float("nan")
+    apart = view._apart(at(cost) for cost in (nan, 9.0, 3.0, 9.2, 3.1, nan))
+    assert [one.cost for one in apart[:2]] == [3.0, 9.0]
