@@ -11,7 +11,7 @@ from ..estimate import Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .selector import SIGNIFICANCE
-from .view import View, by_cost, leaves_much
+from .view import View, by_cost
 
 # a shape such as a lag at which its effect is gone
 _VANISHED = 1e-6
@@ -20,21 +20,21 @@ _VANISHED = 1e-6
 def join(view: View, fit: Fit, effects: Sequence[AbstractEffect], file: AbstractVehicle) -> Fit:
     """The vehicle of `fit` with `effects` more, fitted again as it runs free: what it will be used for.
 
-    The search begins at what innovations say of all numbers, and where that does not run from the effects' predicted
-    sizes or a tenth of them. Where it leaves much, it begins at the numbers of the `file` too: those of a fit that had
-    to do without the effects may lie where nothing leads back, such as a rudder that steers the other way.
+    The search begins at what innovations say of all numbers, and at the numbers of the `file`: those of a fit that had
+    to do without the effects may lie where nothing leads back, such as a rudder that steers the other way. Where
+    neither is better than that fit, it begins from the effects' predicted sizes or a tenth of them.
     """
-    fits: list[Fit] = []
-    for vehicle, share in ((view.vehicle, 1.0), (fit.vehicle, 1.0), (fit.vehicle, 0.1)):
-        fits.append(_searched(fit, joined(vehicle, effects, share)))
-        if float(fits[-1].cost) < float(fit.cost):
-            break
-    best = by_cost(fits)[0]
-    if np.isfinite(float(best.cost)) and not leaves_much(best):
-        return best
     listed = {effect.label for effect in file.effects}
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
-    return by_cost([best, _searched(fit, joined(file, [*earlier, *effects], 1.0))])[0]
+    fits = [
+        _searched(fit, joined(view.vehicle, effects, 1.0)),
+        _searched(fit, joined(file, [*earlier, *effects], 1.0)),
+    ]
+    for share in (1.0, 0.1):
+        if any(float(found.cost) < float(fit.cost) for found in fits):
+            break
+        fits.append(_searched(fit, joined(fit.vehicle, effects, share)))
+    return by_cost(fits)[0]
 
 
 def _searched(fit: Fit, start: AbstractVehicle) -> Fit:

@@ -129,11 +129,11 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     ones wrong.
     """
     problem = fit.problem
-    led = _Led(fit, problem, problem.guess if leaves_much(fit) else fit.start)
+    led = _Led(fit, problem, problem.guess if _leaves_much(fit) else fit.start)
     system = System.of(fit.model, fit.runs, fit.sigma, problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
-    if leaves_much(fit):
+    if _leaves_much(fit):
         vehicles += [file] if file is not None else []
         starts.append([_in_sensors(guess, fit)])
         doubted = _doubting_one(guess, fit)
@@ -149,7 +149,7 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
-def leaves_much(fit: Fit) -> bool:
+def _leaves_much(fit: Fit) -> bool:
     """Whether a fit leaves so much in some channel that it is not to be trusted to have ended near the truth."""
     return max(fit.rms.values()) > _MUCH
 
