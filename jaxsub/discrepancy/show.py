@@ -59,7 +59,10 @@ def hold(
         expected += list(np.asarray(_probable(disturbance, followed))[: len(batch)])
     whitened_error = np.stack(errors) / np.asarray(sigma)
     rms = channel_rms(jnp.asarray(whitened_error), runs.take(list(chosen), len(chosen)), vehicle.layout.channels)
-    return HeldOut(predicted, errors, rms, expected, list(np.sum(whitened_error**2, axis=-1)))
+    squares = np.sum(whitened_error**2, axis=-1)
+    # where a run diverges nothing is expected and everything wrong
+    expected = [np.where(np.isnan(run), -np.inf, run) for run in expected]
+    return HeldOut(predicted, errors, rms, expected, list(np.where(np.isnan(squares), np.inf, squares)))
 
 
 @eqx.filter_jit
@@ -111,13 +114,15 @@ def luck(before: HeldOut, after: HeldOut, sound: bool, *, freely: bool) -> Luck:
 def _gained(more: Sequence[np.ndarray], less: Sequence[np.ndarray], count: int) -> tuple[float, float]:
     """The sum of differences of samples (K,) of every run, and the probability that it is above zero by luck.
 
-    By a bootstrap over blocks of samples (Künsch 1989, Ann. Statist. 17), `count` a run: neighbours go together.
+    By a bootstrap over blocks of samples (Künsch 1989, Ann. Statist. 17), `count` a run: neighbours go together. What
+    is no number, for both diverge or each somewhere, is not above zero.
     """
-    gains = [a - b for a, b in zip(more, less, strict=True)]
-    blocks = np.concatenate([[part.sum() for part in np.array_split(gain, count)] for gain in gains])
     rng = np.random.default_rng(0)
-    drawn = rng.choice(blocks, (_DRAWS, len(blocks))).sum(axis=1)
-    return float(blocks.sum()), float((1 + np.sum(drawn <= 0.0)) / (1 + _DRAWS))
+    with np.errstate(invalid="ignore"):
+        gains = [a - b for a, b in zip(more, less, strict=True)]
+        blocks = np.concatenate([[part.sum() for part in np.array_split(gain, count)] for gain in gains])
+        drawn = rng.choice(blocks, (_DRAWS, len(blocks))).sum(axis=1)
+        return float(blocks.sum()), float((1 + np.sum(~(drawn > 0.0))) / (1 + _DRAWS))
 
 
 def overlays(

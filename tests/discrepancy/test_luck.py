@@ -38,3 +38,13 @@ def test_where_a_free_run_asked_a_free_run_judges():
     assert not luck(NOTHING, shown(outlier, half), True, freely=False).helps
     assert not judged(outlier, once + np.where(np.arange(480) < 60, 0.0, 0.05)).helps
     assert not luck(NOTHING, shown(outlier, half), False, freely=True).helps
+
+
+def test_a_model_that_diverges_gains_nothing_and_one_that_does_no_more_gains():
+    """Claim: where the improved model diverges in a held-out run it is refused, where the baseline did it is not."""
+    lost = shown(np.full(480, -np.inf), np.full(480, np.inf))
+    better = shown(np.full(480, 0.1), np.full(480, 0.5))
+    for freely in (False, True):
+        assert not luck(NOTHING, lost, True, freely=freely).helps
+        assert not luck(lost, lost, True, freely=freely).helps
+        assert luck(lost, better, True, freely=freely).helps
