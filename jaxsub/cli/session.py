@@ -24,7 +24,7 @@ from ..recording import Recording, load, read_selection
 from ..vehicle import AbstractVehicle
 
 console = Console(stderr=True)
-# a third less time, for programs that run as fast; on jax 0.10 half the time, for programs up to a quarter slower
+# up to a third less time, for programs that run as fast; on jax 0.10 half, for programs up to a quarter slower
 _QUICKLY, _QUICKER = "--xla_backend_optimization_level=1", "--xla_cpu_use_fusion_emitters=false"
 
 
