@@ -24,7 +24,7 @@ def led_to(times):
 
 
 def test_a_turn_leads_to_nothing_less_probable(fitted, monkeypatch):
-    """Claim: a search for the disturbance that ends far off changes nothing; where half its way is right, it goes that."""
+    """Claim: a search for the disturbance that ends far off changes nothing; where half its way is right, half."""
     found = look(fitted)
     monkeypatch.setattr(view, "estimate_disturbance", led_to(1.0))
     still = evidence_of(look(fitted, found.disturbance))
