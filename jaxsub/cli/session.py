@@ -45,7 +45,10 @@ def start(long: bool = False) -> None:
 
 
 def _compile_quickly() -> None:
-    """Options of XLA, which reads them when it first compiles; what the caller set is left as it is."""
+    """Options of XLA, which reads them when it first compiles, and ends the process at one that it does not know.
+
+    What the caller set is left as it is.
+    """
     given = os.environ.get("XLA_FLAGS", "").split()
     known = [_QUICKLY, *([_QUICKER] if jax.__version_info__[:2] == (0, 10) else [])]
     fresh = [flag for flag in known if not any(one.startswith(flag.split("=")[0]) for one in given)]

@@ -128,15 +128,16 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     is left is put down to forces at first, or to sensors: forces that follow a sensor which is wrong make the right
     ones wrong.
     """
-    problem = fit.problem
-    led = _Led(fit, problem, problem.guess if _leaves_much(fit) else fit.start)
+    problem, rms = fit.problem, fit.rms
+    much = max(rms.values()) > _MUCH
+    led = _Led(fit, problem, problem.guess if much else fit.start)
     system = System.of(fit.model, fit.runs, fit.sigma, problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
-    if _leaves_much(fit):
+    if much:
         vehicles += [file] if file is not None else []
-        starts.append([_in_sensors(guess, fit)])
-        doubted = _doubting_one(guess, fit)
+        in_sensors, doubted = _doubting(guess, np.array([rms[c] for c in fit.vehicle.layout.channels]))
+        starts.append([in_sensors])
     best = lambda pairs: by_cost(led.at(*pair) for pair in pairs)[0]
     searches = [best([(v, start) for start in some]) for v in vehicles for some in starts]
     searches += by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
@@ -147,11 +148,6 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
     return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
-
-
-def _leaves_much(fit: Fit) -> bool:
-    """Whether a fit leaves so much in some channel that it is not to be trusted to have ended near the truth."""
-    return max(fit.rms.values()) > _MUCH
 
 
 def by_cost(found: Iterable[_Costed]) -> list[_Costed]:
@@ -191,20 +187,14 @@ def _settled(led: "_Led", at: "_At") -> "_At":
     return at
 
 
-def _in_sensors(guess: Disturbance, fit: Fit) -> Disturbance:
-    """What a fit leaves, put down to the noise of each channel."""
-    return Disturbance(_QUIET * guess.force, guess.time, jnp.maximum(guess.noise, _rms(fit)))
-
-
-def _doubting_one(guess: Disturbance, fit: Fit) -> list[Disturbance]:
-    """What a fit leaves in one channel put down to its noise, and in the others to forces: each that leaves much."""
-    rms = np.asarray(_rms(fit))
-    noisy, doubtful = np.maximum(np.asarray(guess.noise), rms), np.diag(rms > _MUCH)
-    return [dataclasses.replace(guess, noise=jnp.where(own, noisy, guess.noise)) for own in doubtful if own.any()]
-
-
-def _rms(fit: Fit) -> Array:
-    return jnp.asarray([fit.rms[channel] for channel in fit.vehicle.layout.channels])
+def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturbance, list[Disturbance]]:
+    """What a fit leaves, `rms` over sigma of each channel, put down to the noise of all channels; or of one that it
+    leaves much in, and in the others to forces: for each such.
+    """
+    noisy = jnp.maximum(guess.noise, rms)
+    alone = [jnp.where(own, noisy, guess.noise) for own in np.diag(rms > _MUCH) if own.any()]
+    every = Disturbance(_QUIET * guess.force, guess.time, noisy)
+    return every, [dataclasses.replace(guess, noise=noise) for noise in alone]
 
 
 def _white(fit: Fit) -> Array:

@@ -39,7 +39,7 @@ def test_a_turn_leads_to_nothing_less_probable(fitted, monkeypatch):
 
 
 def test_searches_that_agree_are_one():
-    """Claim: of searches that came to the same cost, or to none, one goes on, and the order is by cost."""
+    """Claim: of searches that came to the same cost one goes on; the order is by cost, those without one last."""
 
     def at(cost):
         made = object.__new__(view._At)
@@ -49,3 +49,4 @@ def test_searches_that_agree_are_one():
     nan = float("nan")
     apart = view._apart(at(cost) for cost in (nan, 9.0, 3.0, 9.2, 3.1, nan))
     assert [one.cost for one in apart[:2]] == [3.0, 9.0]
+    assert all(one.cost != one.cost for one in apart[2:])

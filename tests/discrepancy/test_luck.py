@@ -1,9 +1,13 @@
 """Whether what held-out runs gain is more than luck."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from diagnosis_cases import recorded, wrong
 
-from jaxsub.discrepancy.show import HeldOut, luck
+from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.show import HeldOut, hold, luck
+from jaxsub.likelihood import Disturbance
 
 
 def shown(expected: np.ndarray, squares: np.ndarray) -> HeldOut:
@@ -48,3 +52,15 @@ def test_a_model_that_diverges_gains_nothing_and_one_that_does_no_more_gains():
         assert not luck(NOTHING, lost, True, freely=freely).helps
         assert not luck(lost, lost, True, freely=freely).helps
         assert luck(lost, better, True, freely=freely).helps
+
+
+def test_a_held_out_run_that_diverges_is_no_number_nowhere():
+    """Claim: a vehicle that runs away on a held-out run errs without limit there, and is refused."""
+    runs, sigma = batch(wrong(), recorded(None, 2)[:1]), jnp.array([output.sigma for output in wrong().layout.outputs])
+    still = Disturbance(jnp.ones(2), jnp.ones(2), jnp.ones(len(sigma)))
+    away = wrong().with_values({"M_q": jnp.asarray(1e8), "M_w": jnp.asarray(1e8)})
+    before, after = (hold(vehicle, runs, [0], 1, sigma, still) for vehicle in (wrong(), away))
+    assert np.isposinf(after.squares[0]).any()
+    assert not any(np.isnan(part).any() for part in (*after.squares, *after.expected))
+    for freely in (False, True):
+        assert not luck(before, after, True, freely=freely).helps
