@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect, SmoothForce
+from ..effects import AbstractEffect
 from ..errors import InputError
 from ..estimate import Fit, fit
 from ..recording import Recording
@@ -20,6 +20,7 @@ from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress
 from .show import channel_quality, coefficients, estimates, overlays, run_quality
+from .stand_in import described
 from .trial import Found, Model, Trial
 from .verdict import Judged, summary
 from .view import View, look
@@ -58,8 +59,9 @@ def diagnose(
     progress("free runs through what the fit did not see")
     trial = Trial(runs, range(size, size + len(held)), size, start.sigma, progress, vehicle)
     baseline = Model(start, found.view, trial.held_out(start, found.view.disturbance), ())
-    best, judged = explained(trial, baseline, found, vocabulary)
-    return _told(vehicle, train, held, found, field, baseline, best, judged)
+    named, judged, left = explained(trial, baseline, found, vocabulary)
+    best, judged = (named, judged) if left is None else described(trial, named, left, judged, vocabulary)
+    return _told(vehicle, train, held, found, field, baseline, named, best, judged)
 
 
 def _told(
@@ -69,22 +71,24 @@ def _told(
     first: Found,
     field: Field,
     baseline: Model,
+    named: Model,
     best: Model,
     judged: Judged,
 ) -> tuple[Diagnosis, AbstractVehicle]:
-    """The diagnosis, and the improved vehicle."""
+    """The diagnosis, and the improved vehicle: the `best` model, of which the `named` one has the numbers of names."""
     layout, before, after = vehicle.layout, baseline.shown, best.shown
     start = allowing_for(baseline.view, baseline.fit)
     improved = allowing_for(best.view, best.fit) if best.added else start
     where = _where(judged, first, field, train)
-    physics = [_physics(named, improved) for named in judged.named]
-    nameless = [effect.equation for effect in best.added if isinstance(effect, SmoothForce)]
+    own = improved if named is best else allowing_for(named.view, named.fit)
+    physics = [_physics(one, own) for one in judged.named]
+    standing = best.added[len(named.added) :]
     models = [("baseline", before), *([("improved", after)] if best.added else [])]
     in_units = lambda rms: {c: value * float(s) for (c, value), s in zip(rms.items(), start.sigma, strict=True)}
     diagnosis = Diagnosis(
         verdict=judged.verdict,
         vehicle=layout.name,
-        summary=summary(judged.verdict, physics, where, nameless),
+        summary=summary(judged.verdict, physics, where, standing),
         p_value=judged.p_value,
         where=where,
         physics=physics,
@@ -113,7 +117,7 @@ def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording
         return []
     share, view = field.share, found.view
     if judged.named:
-        effects = [named.effect for named in judged.named]
+        effects = [one.effect for one in judged.named]
         share = effect_shares(view, effects, found.naming.products.disturbance)
     elif found.nameless is not None:
         share = {place: 0.5 * part for place, part in share.items()}

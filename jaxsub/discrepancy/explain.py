@@ -15,7 +15,7 @@ from .programs import make_room
 from .progress import Progress
 from .selector import Selector
 from .show import luck
-from .trial import Found, Model, Trial, tried, unnamed, worth_trying
+from .trial import Found, Model, Trial, tried, worth_trying
 from .verdict import NOTHING, Judged, both, idle, judge
 from .view import View, facts
 from .whiteness import RANDOM, Memory, memory
@@ -26,13 +26,17 @@ _REFUSALS = 2
 
 def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
     """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
+    return weighed(view, listed(view, vocabulary), progress)
+
+
+def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None) -> Selector:
+    """All that the recordings of a view may ask for and that its vehicle does not have."""
     make_room()
     present = {effect.label for effect in view.vehicle.effects}
     known = facts(view)
-    listed = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
-    columns, owners = candidate_columns(view, listed)
-    evidence = Evidence.of(view, columns)
-    return weighed(view, Selector(evidence, listed, owners, looked_at(known, vocabulary)), progress)
+    absent = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
+    columns, owners = candidate_columns(view, absent)
+    return Selector(Evidence.of(view, columns), absent, owners, looked_at(known, vocabulary))
 
 
 def weighed(view: View, selector: Selector, progress: Progress) -> Found:
@@ -56,13 +60,12 @@ def _memory(evidence: Evidence, naming: Naming) -> Memory:
 
 def explained(
     trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
-) -> tuple[Model, Judged]:
-    """The best model, and what is to be said.
+) -> tuple[Model, Judged, Found | None]:
+    """The model with what can be named, what is to be said, and the last look at what is left, if anything may be.
 
     Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
     they leave is not random: far from the truth a linear picture shows the largest alone. Where the held-out runs
-    refuse all that was named and the mismatch is beyond doubt, the rest of the vocabulary is asked. What is left when
-    nothing more is named, and that the motion predicts, is modelled by a force without a name.
+    refuse all that was named and the mismatch is beyond doubt, the rest of the vocabulary is asked.
     """
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
@@ -82,10 +85,10 @@ def explained(
         if chosen and said.verdict == "unknown" and refusals < _REFUSALS:
             refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
         if after is None and not said.named:
-            return unnamed(trial, best, found, judged)
+            return best, judged, found
         whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.remains)
         if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
-            return best, judged
+            return best, judged, None
         found = after or examine(best.view, vocabulary, trial.progress)
 
 

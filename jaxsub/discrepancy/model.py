@@ -22,18 +22,19 @@ def join(view: View, fit: Fit, effects: Sequence[AbstractEffect], file: Abstract
 
     The search begins at what innovations say of all numbers, and at the numbers of the `file`: those of a fit that had
     to do without the effects may lie where nothing leads back, such as a rudder that steers the other way. Where
-    neither is better than that fit, it begins from the effects' predicted sizes or a tenth of them.
+    neither is better than that fit, it begins from the effects' predicted sizes or a tenth of them. Numbers that are
+    not free in the fit stay as they are in it.
     """
     listed = {effect.label for effect in file.effects}
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
-    fits = [
-        _searched(fit, joined(view.vehicle, effects, 1.0)),
-        _searched(fit, joined(file, [*earlier, *effects], 1.0)),
-    ]
+    values = fit.vehicle.values()
+    held = {row.name: values[row.name] for row in fit.vehicle.layout.parameters if not row.free}
+    searched = lambda start: _searched(fit, start.with_values(held).holding(held))
+    fits = [searched(joined(view.vehicle, effects, 1.0)), searched(joined(file, [*earlier, *effects], 1.0))]
     for share in (1.0, 0.1):
         if any(float(found.cost) < float(fit.cost) for found in fits):
             break
-        fits.append(_searched(fit, joined(fit.vehicle, effects, share)))
+        fits.append(searched(joined(fit.vehicle, effects, share)))
     return by_cost(fits)[0]
 
 

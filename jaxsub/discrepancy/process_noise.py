@@ -177,8 +177,7 @@ class Above(AbstractNoiseRule):
 
 def noise_filter(vehicle: AbstractVehicle, substeps: int, sigma: Float[Array, " c"]) -> ExtendedKalmanFilter:
     """The extended Kalman filter of a vehicle whose numbers are all known, with fuzzy noise above a constant one."""
-    rows = tuple(dataclasses.replace(row, free=False) for row in vehicle.layout.parameters)
-    known = dataclasses.replace(vehicle, layout=dataclasses.replace(vehicle.layout, parameters=rows))
+    known = vehicle.holding(vehicle.values())
     scale = state_scale(known, sigma)
     constant = ConstantNoise(jnp.diag(_FLOOR * scale))
     rule = Above(constant, FuzzyNoise(_LEAST * scale, _MOST * scale, width=_WIDTH))

@@ -121,6 +121,12 @@ class Selector:
         """(m,) the share of what `chosen` leave of a free run's errors that each candidate explains."""
         return self.free.explained(self.columns(chosen), self.owners)
 
+    def freely_predicted(self, chosen: Sequence[int], index: int) -> tuple[AbstractEffect, bool]:
+        """A candidate with the numbers that a free run predicts beside `chosen`, and whether physics admits them."""
+        own = self.owners[index]
+        size = self.free.gains(self.columns(chosen), [own]).amplitudes[0]
+        return predict(self.candidates[index], size / self.evidence.length[own])
+
     def foremost(self, chosen: Sequence[int], scan: Scan) -> int:
         """Which candidate to take next: the most probable, unless a free run asks for another and hardly for it.
 

@@ -14,7 +14,7 @@ from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .evidence import evidence_of
 from .generic import Pattern, most_explained
-from .model import allowing_for, join, p_value, sound, told
+from .model import join, p_value, sound, told
 from .name import Naming, named_on, refitted, standing
 from .programs import make_room
 from .progress import Progress
@@ -28,8 +28,6 @@ from .whiteness import Memory
 _MUCH_LESS = 4.0
 # of the log evidence that all of some candidates gain, from which one that gains so much alone is tried by itself first
 _NEARLY_ALL = 0.9
-# times a standard error, to which it may grow by a force without a name
-_ABOUT = 2.0
 # candidates by number with the log evidence of a fit
 Fits = list[tuple[int, float]]
 
@@ -245,24 +243,3 @@ def worth_trying(found: Found, judged: Judged) -> list[int]:
             selector.freely.add(best)
             return [best]
     return []
-
-
-def as_well_known(base: Model, more: Model) -> bool:
-    """Whether the numbers of what was added to `base` are known about as well in `more`, disturbances allowed for."""
-    before, after = (allowing_for(model.view, model.fit).standard_errors for model in (base, more))
-    own = [f"{effect.label}.{symbol}" for effect in base.added for symbol in effect.symbols().values()]
-    return all(after[name] < _ABOUT * before[name] for name in own)
-
-
-def unnamed(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
-    """The model with the force without a name, if it stands on the held-out runs and leaves what was named its numbers.
-
-    A smooth force of a rate holds friction and damping as well: beside it the runs would not tell them any more.
-    """
-    if found.pattern is None or not found.pattern.joins:
-        return base, judged
-    force = found.pattern.force
-    more = trial.with_effects(base, [force], found.naming.products.disturbance)
-    good = sound(more.fit, more.added) and (not base.added or as_well_known(base, more))
-    gain = luck(base.shown, more.shown, good, freely=False)
-    return (more if gain.helps else base), helped(judged, force, gain)

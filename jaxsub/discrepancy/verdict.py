@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 
-from ..effects import AbstractEffect
+from ..effects import AbstractEffect, SmoothForce
 from .diagnosis import Location, Physics, Verdict
 from .generic import Pattern
 from .name import Named, Naming
@@ -86,6 +86,13 @@ def _gain_said(label: str, gain: Luck) -> str:
     return f"{label} fitted the training runs better but {why}, and is not accepted."
 
 
+def standing_in(judged: Judged, effects: Sequence[AbstractEffect]) -> Judged:
+    """The verdict with a word on effects that are in the model and were not named."""
+    labels = ", ".join(effect.label for effect in effects)
+    note = f"Free runs through the held-out runs err less with {labels}, which stand in for what has no name."
+    return dataclasses.replace(judged, notes=[*judged.notes, note])
+
+
 def idle(judged: Judged, label: str, others: Sequence[str]) -> Judged:
     """The verdict less an effect that is not asked for any more beside `others`."""
     named = [one for one in judged.named if one.effect.label != label]
@@ -109,9 +116,12 @@ def _certainty(named: Sequence[Named]) -> Verdict:
     return "named" if all(one.probability >= _CERTAIN for one in named) else "ambiguous"
 
 
-def summary(verdict: Verdict, physics: list[Physics], where: list[Location], nameless: Sequence[str]) -> str:
-    """The verdict in a sentence, and one of the equations to which a force without a name was added."""
-    added = f" What has no name in {' and '.join(nameless)} is modelled by a smooth force." if nameless else ""
+def summary(verdict: Verdict, physics: list[Physics], where: list[Location], standing: Sequence[AbstractEffect]) -> str:
+    """The verdict in a sentence, and one on effects that are in the model and were not named."""
+    forces = [effect for effect in standing if isinstance(effect, SmoothForce)]
+    said = [effect.label for effect in standing if effect not in forces]
+    said += [f"a smooth force in {force.equation}" for force in forces]
+    added = f" What has no name is described, its cause unclaimed, by {', '.join(said)}." if said else ""
     return _verdict_said(verdict, physics, where) + added
 
 

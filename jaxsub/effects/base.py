@@ -14,9 +14,12 @@ from ..parameters import Parameter, number
 from .motion import Facts, Motion, Signal
 
 
-def amplitude(unit: str, sign: int = 0, default: float = 0.0) -> Any:
-    """A field that the effect is linear in. `sign` +1 or -1 is the only one that physics admits; 0 admits both."""
-    return _field("amplitude", unit, sign, default)
+def amplitude(unit: str, sign: int = 0, default: float = 0.0, most: float = math.inf) -> Any:
+    """A field that the effect is linear in, of a size that physics admits up to `most`.
+
+    `sign` +1 or -1 is the only one that it admits; 0 admits both.
+    """
+    return _field("amplitude", unit, sign, default, most)
 
 
 def shape(unit: str, sign: int = 0, default: float = 0.0) -> Any:
@@ -24,11 +27,11 @@ def shape(unit: str, sign: int = 0, default: float = 0.0) -> Any:
     return _field("shape", unit, sign, default)
 
 
-def _field(role: str, unit: str, sign: int, default: float) -> Any:
+def _field(role: str, unit: str, sign: int, default: float, most: float = math.inf) -> Any:
     return eqx.field(
         default_factory=lambda: number(default),
         converter=number,
-        metadata={"role": role, "unit": unit, "sign": sign},
+        metadata={"role": role, "unit": unit, "sign": sign, "most": most},
     )
 
 
@@ -239,8 +242,9 @@ def parameter_table(effect: AbstractEffect) -> dict[str, Parameter]:
 
 
 def admissible(effect: AbstractEffect, values: dict[str, float]) -> bool:
-    """Whether every value has the sign that physics asks of it."""
-    return all(values[name] * sign >= 0.0 for name, sign in effect.signs().items())
+    """Whether every value has the sign that physics asks of it and is no larger than it admits."""
+    within = all(abs(values[field.name]) <= field.metadata["most"] for field in number_fields(effect))
+    return within and all(values[name] * sign >= 0.0 for name, sign in effect.signs().items())
 
 
 def with_numbers(effect: AbstractEffect, values: Mapping[str, ArrayLike]) -> Any:

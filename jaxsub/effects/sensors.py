@@ -44,7 +44,8 @@ class SensorScale(AbstractSensor):
     name: ClassVar[str] = "sensor-scale"
     family: ClassVar[str] = "sensors"
     channel: str = eqx.field(static=True)
-    scale: Array = amplitude("1")
+    # a sensor that is off by more than what it should show is no sensor of it, but a way out
+    scale: Array = amplitude("1", most=1.0)
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorScale]":

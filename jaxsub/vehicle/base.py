@@ -2,7 +2,7 @@
 
 import abc
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Self
 
 import equinox as eqx
@@ -161,6 +161,12 @@ class AbstractVehicle(eqx.Module):
             positions=tuple(name for name in self.layout.positions if name not in lost),
         )
         return dataclasses.replace(self, effects=kept, layout=layout)
+
+    def holding(self, names: Collection[str]) -> Self:
+        """The same vehicle, the numbers of those `names` no longer free."""
+        held = lambda row: dataclasses.replace(row, free=row.free and row.name not in names)
+        layout = dataclasses.replace(self.layout, parameters=tuple(map(held, self.layout.parameters)))
+        return dataclasses.replace(self, layout=layout)
 
     def position_rates(self, motion: Motion) -> dict[str, Signal]:
         """Rates of the position states, effects included."""

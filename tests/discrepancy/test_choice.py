@@ -18,7 +18,7 @@ from jaxsub.discrepancy.model import join, told
 from jaxsub.discrepancy.name import Named, named_on, refitted
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.show import Luck
-from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, together, unnamed
+from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, together
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM
@@ -208,13 +208,12 @@ class Asked:
     """Looks at recordings of which the answers are given, each a refusal or what stands; what was asked is counted."""
 
     def __init__(self, monkeypatch, *answers):
-        self.answers, self.tried, self.without_name = [*answers], 0, 0
+        self.answers, self.tried = [*answers], 0
         path = sys.modules["jaxsub.discrepancy.explain"]
         fakes = {
             "judge": lambda *_: Judged("named", [], 1e-9, []),
             "worth_trying": lambda found, judged: [0] if self.answers else [],
             "tried": self.try_one,
-            "unnamed": self.unnamed,
             "weighed": lambda *_: self.found(),
         }
         for name, fake in fakes.items():
@@ -228,33 +227,31 @@ class Asked:
         self.tried += 1
         return best, self.answers.pop(0)
 
-    def unnamed(self, trial, best, found, judged):
-        self.without_name += 1
-        return best, judged
-
     def answer(self):
-        return self.explained(silent(), Model(None, None, None, ()), self.found(), None)[1]
+        """What is said, and whether there is something left to describe."""
+        _, said, left = self.explained(silent(), Model(None, None, None, ()), self.found(), None)
+        return said, left is not None
 
 
 def test_others_are_asked_where_all_that_was_named_is_refused(monkeypatch):
-    """Claim: what stands after a refusal is named, refusals and all; after three an unknown force is tried."""
+    """Claim: what stands after a refusal is named, refusals and all; after three what is left is to be described."""
     refused = Judged("unknown", [], 1e-9, ["refused"])
     damping = Named(0, QuadraticDamping("x", -0.5), 1.0, [], [])
     asked = Asked(monkeypatch, refused, Judged("named", [damping], 1e-9, ["stands"]))
-    answer = asked.answer()
+    answer, left = asked.answer()
     assert (answer.verdict, answer.named, answer.notes) == ("named", [damping], ["refused", "stands"])
-    assert (asked.tried, asked.without_name) == (2, 0)
+    assert (asked.tried, left) == (2, False)
     asked = Asked(monkeypatch, *[refused] * 5)
-    assert asked.answer().verdict == "unknown"
-    assert (asked.tried, asked.without_name) == (3, 1)
+    answer, left = asked.answer()
+    assert (answer.verdict, asked.tried, left) == ("unknown", 3, True)
 
 
 def test_what_is_beyond_doubt_stays_unknown_where_the_rest_says_nothing(monkeypatch):
     """Claim: a mismatch whose only candidates were refused is not called none."""
     nothing = Judged("none", [], 1.0, [])
     asked = Asked(monkeypatch, Judged("unknown", [], 1e-9, ["refused"]), nothing)
-    answer = asked.answer()
-    assert (answer.verdict, answer.p_value, asked.without_name) == ("unknown", 1e-9, 1)
+    answer, left = asked.answer()
+    assert (answer.verdict, answer.p_value, left) == ("unknown", 1e-9, True)
 
 
 class Weighed(Selector):
@@ -299,22 +296,3 @@ def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monk
     assert after_all(trial, base, seen("surge", yaw, roll), unknown, None) == (base, unknown, None)
     assert after_all(trial, base, seen(None, yaw, roll), unknown, None) == (base, unknown, None)
     assert asked == [[7]]
-
-
-@pytest.mark.parametrize(("error", "joins"), [(0.015, True), (0.5, False)])
-def test_a_force_without_a_name_leaves_what_was_named_its_numbers(monkeypatch, error, joins):
-    """Claim: beside friction it joins where friction's error hardly grows, and not where it trades with it."""
-    friction, force = CoulombFriction("x", 0.01), QuadraticDamping("x", -0.5)
-    errors = {"coulomb-friction[x].F_c": 0.01, "coulomb-friction[x].F_0": 0.01}
-    base, more = Model(0, None, None, (friction,)), Model(1, None, None, (friction, force))
-    found_errors = [errors, errors | {"coulomb-friction[x].F_0": error, "quadratic-damping[x].X_xx": 9.0}]
-    monkeypatch.setattr(Trial, "with_effects", lambda *_: more)
-    path = sys.modules["jaxsub.discrepancy.trial"]
-    monkeypatch.setattr(path, "allowing_for", lambda view, fit: SimpleNamespace(standard_errors=found_errors[fit]))
-    monkeypatch.setattr(path, "sound", lambda fit, effects: True)
-    monkeypatch.setattr(path, "luck", lambda *given, freely: Luck(9.0, 0.001, 0.5, 0.001, given[2], freely))
-    naming = SimpleNamespace(products=SimpleNamespace(disturbance=None))
-    found = looked(naming, SimpleNamespace(joins=True, force=force))
-    best, said = unnamed(silent(), base, found, Judged("named", [], 1e-9, []))
-    assert best is (more if joins else base)
-    assert ("gain" in said.notes[0]) is joins

@@ -16,6 +16,8 @@ from jaxsub.effects import (
     SensorMisalignment,
     SensorRectification,
     SensorSaturation,
+    SensorScale,
+    admissible,
 )
 
 NOW = motion(BODY, count=50)
@@ -120,3 +122,9 @@ def test_a_sensor_off_the_centre_moves_with_the_body(axis):
 def test_lever_arms_are_suspected_where_they_show():
     found = {(e.channel, e.axis) for e in SensorLeverArm.candidates(BODY)}
     assert found == {("u", "y"), ("u", "z"), ("z", "x"), ("z", "y"), ("ax", "x"), ("ax", "y"), ("ax", "z")}
+
+
+def test_a_sensor_is_off_by_no_more_than_what_it_should_show():
+    """Claim: a scale wrong by up to its own size is a sensor's error, and a larger one is refused as a way out."""
+    allowed = [admissible(SensorScale("u"), {"scale": scale}) for scale in (-22.0, -1.01, -0.3, 0.0, 0.99, 1.01, 22.0)]
+    assert allowed == [False, False, True, True, True, False, False]

@@ -1,0 +1,98 @@
+"""What has no name is described by what free runs ask for, and what was named keeps its numbers."""
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnosis_cases import recorded, wrong
+
+from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.model import join
+from jaxsub.discrepancy.selector import Selector
+from jaxsub.discrepancy.show import Luck
+from jaxsub.discrepancy.stand_in import described, freest
+from jaxsub.discrepancy.trial import Found, Model, Trial
+from jaxsub.discrepancy.verdict import Judged
+from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.whiteness import RANDOM, Memory
+from jaxsub.effects.hull import HullAsymmetry
+from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
+from jaxsub.effects.sensors import SensorScale
+from jaxsub.estimate import fit
+
+
+class Freely(Selector):
+    """What `freest` asks of a selector: shares of a free run's errors on top of others, and which signs it predicts."""
+
+    def __init__(self, candidates, shares, admitted):
+        self.candidates, self.usable = candidates, np.ones(len(candidates), bool)
+        self.evidence = SimpleNamespace(best=lambda columns: (0.0, SimpleNamespace(disturbance=None)))
+        self.of_free_run = lambda chosen: np.array(shares[len(chosen)])
+        self.freely_predicted = lambda chosen, index: (candidates[index], admitted(chosen, index))
+
+
+def test_stands_in_what_moves_the_vehicle_and_explains_enough_of_free_runs():
+    """Claim: the largest share first, on top of the others; no sensor, no wrong sign, nothing twice, none below 5 %."""
+    surge, yaw, sensor = QuadraticDamping("surge", -1.0), CubicDamping("yaw", -1.0), SensorScale("r", 0.1)
+    stronger = QuadraticDamping("surge", -2.0)
+    shares = [(0.3, 0.2, 0.5, 0.25), (0.0, 0.06, 0.5, 0.2), (0.0, 0.0, 0.5, 0.1)]
+    good = lambda chosen, index: True
+    assert freest(Freely([surge, yaw, sensor, stronger], shares, good)) == [surge, yaw]
+    assert freest(Freely([surge, yaw, sensor, stronger], [shares[0], (0.0, 0.04, 0.5, 0.2)], good)) == [surge]
+    assert freest(Freely([surge, yaw], [(0.3, 0.2), (0.0, 0.0)], lambda chosen, index: index == 1)) == [yaw]
+    turned = lambda chosen, index: not (chosen and index == 0)
+    assert freest(Freely([surge, yaw], [(0.3, 0.2), (0.3, 0.2), (0.0, 0.0)], turned)) == [yaw]
+
+
+def seen(selector, memory):
+    """A last look at recordings, of which only the selector and what is left matter."""
+    found = object.__new__(Found)
+    parts = {"naming": None, "pattern": None, "memory": memory, "view": None, "selector": selector}
+    for name, value in parts.items():
+        object.__setattr__(found, name, value)
+    return found
+
+
+@pytest.mark.parametrize(("helps", "left", "stands"), [(True, 1e-9, True), (False, 1e-9, False), (True, 1.0, False)])
+def test_a_description_joins_where_something_is_left_and_free_runs_err_less(monkeypatch, helps, left, stands):
+    """Claim: a drag of the wrong sign goes and the rest stands; not where free runs are worse or nothing is left."""
+    surge, yaw = QuadraticDamping("surge", -1.0), CubicDamping("yaw", -1.0)
+    shares = [(0.3, 0.2), (0.0, 0.2), (0.0, 0.0)]
+    selector = Freely([surge, yaw], shares, lambda chosen, index: selector.usable[index])
+    runs = batch(wrong(), recorded(None, 2)[:2])
+    found = fit(wrong(), runs)
+    named = Model(found, look(found), None, ())
+    fitted = lambda trial, model, effects, disturbance: model._replace(added=(*model.added, *effects))
+    monkeypatch.setattr(Trial, "with_effects", fitted)
+    path = sys.modules["jaxsub.discrepancy.stand_in"]
+    again = Freely([], [()], lambda *_: True)
+    fakes = {
+        "sound": lambda fit, effects: effects[0] is not yaw,
+        "luck": lambda *given, freely: Luck(-1.0, 1.0, 0.5, 0.01 if helps else 0.5, given[2], freely),
+        "listed": lambda *_: again,
+        "weighed": lambda *_: seen(again, RANDOM),
+    }
+    for name, fake in fakes.items():
+        monkeypatch.setattr(path, name, fake)
+    trial = object.__new__(Trial)
+    object.__setattr__(trial, "progress", lambda message: None)
+    best, said = described(trial, named, seen(selector, Memory(left, 1.0)), Judged("unknown", [], 1e-9, []), None)
+    assert best.added == ((surge,) if stands else ())
+    assert (best is named) is not stands
+    assert said.verdict == "unknown"
+    assert said.named == []
+    assert [surge.label in note for note in said.notes] == [True] * stands
+
+
+def test_numbers_that_are_held_stay_through_every_search():
+    """Claim: a moment that is held is the same after a fit with a drag more, which begins at the file's numbers too."""
+    runs = batch(wrong(), recorded(HullAsymmetry("pitch", 300.0), 2)[:2])
+    vehicle = wrong().with_effect(HullAsymmetry("pitch", 250.0))
+    own = next(row.name for row in vehicle.layout.free if row.name.startswith("hull-asymmetry"))
+    found = fit(vehicle.holding([own]), runs)
+    more = join(look(found), found, [QuadraticDamping("heave", -1.0)], wrong())
+    assert own not in more.names
+    assert float(more.vehicle.values()[own]) == 250.0
+    assert any(name.startswith("quadratic-damping") for name in more.names)
+    assert float(more.cost) < float(found.cost)
