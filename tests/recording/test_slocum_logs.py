@@ -1,5 +1,9 @@
 """A dive that a real glider recorded loads in SI; its sensors agree with one another as physics has them."""
 
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +12,11 @@ import pytest
 from jaxsub.errors import InputError
 from jaxsub.recording import Selection, channels, load
 
-dbdreader = pytest.importorskip("dbdreader")
-DATA = Path(dbdreader.__file__).parent / "data"
+# looked for, not imported: workers that collect at the same moment would run into one another at the first import
+PACKAGE = find_spec("dbdreader")
+if PACKAGE is None or PACKAGE.origin is None:
+    pytest.skip("needs dbdreader", allow_module_level=True)
+DATA = Path(PACKAGE.origin).parent / "data"
 DIVE = DATA / "ammonite-2008-028-01-000.mbd"  # Mediterranean, January 2008; the file lists its own sensors
 
 
@@ -65,3 +72,25 @@ def test_contents_have_units_and_counts(dive):
 def test_sensor_list_that_is_missing_is_one_error():
     with pytest.raises(InputError, match="Cache file"):
         channels(DATA / "amadeus-2014-204-05-000.dbd")
+
+
+BESIDE = """
+import os, sys
+made = os.makedirs
+def made_by_another(*arguments, **options):
+    os.makedirs = made
+    made(*arguments, **options)
+    raise FileExistsError(17, "File exists", *arguments)
+from jaxsub.recording import channels
+os.makedirs = made_by_another
+print(len(channels(sys.argv[1])))
+assert os.makedirs is made
+"""
+
+
+def test_two_processes_may_be_the_first_to_read(tmp_path):
+    command = [sys.executable, "-c", BESIDE, str(DIVE)]
+    fresh = os.environ | {"HOME": str(tmp_path)}
+    done = subprocess.run(command, env=fresh, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 100

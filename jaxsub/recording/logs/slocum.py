@@ -1,5 +1,6 @@
 """Slocum gliders' binary files (.dbd, .ebd, .sbd, .tbd, .mbd, .nbd and compressed .?cd), read by dbdreader."""
 
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,7 +31,7 @@ class SlocumLog(Log):
 
     def __init__(self, path: Path):
         self._path = path
-        self._package = optional("dbdreader", "logs", str(path))
+        self._package = _dbdreader(str(path))
 
     def channels(self) -> list[Channel]:
         """Every sensor that was updated at least once."""
@@ -66,6 +67,15 @@ class SlocumLog(Log):
 def _unit(file: Any, name: str) -> str:
     unit: str = file.parameterUnits[name]
     return "" if unit in _BARE else _SPELT.get(unit.lower(), unit)
+
+
+def _dbdreader(where: str) -> Any:
+    try:
+        return optional("dbdreader", "logs", where)
+    except FileExistsError:  # another process made, at the same moment, the folder that the first import makes
+        for half_imported in [name for name in sys.modules if name.startswith("dbdreader.")]:
+            del sys.modules[half_imported]
+        return optional("dbdreader", "logs", where)
 
 
 def _in_order(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
