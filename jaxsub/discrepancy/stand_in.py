@@ -2,19 +2,22 @@
 
 A name claims a cause, and needs evidence that it is this one and no other. A model is to be used all the same. So what
 makes its free runs err less, on runs that no fit saw too, may stand in it and claims nothing: some effects of the
-vocabulary, and a smooth force of one variable. What was named keeps its numbers meanwhile: beside a description that is
-much alike, such as friction beside any force of the rate, the recordings would not tell them any more.
+vocabulary, and a smooth force of one variable. What was named is fitted again beside it, unless the two are so much
+alike, such as friction and any force of the rate, that the recordings would not tell its numbers any more: then it
+keeps them.
 """
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..effects import AbstractEffect, AbstractInstrument, parameter_table
+from ..likelihood import Disturbance
 from .explain import listed, weighed
-from .model import sound
+from .model import allowing_for, sound
 from .selector import Selector
-from .show import luck
+from .show import Luck, luck
 from .trial import Found, Model, Trial
 from .verdict import Judged, helped, standing_in
 
@@ -22,15 +25,17 @@ from .verdict import Judged, helped, standing_in
 _AT_ONCE, _TRIES, _TIMES = 4, 3, 3
 # of the squared errors of a free run, the share that each must explain
 _ENOUGH = 0.05
+# times a standard error, to which it may grow beside a description
+_ABOUT = 2.0
 
 
 def described(
     trial: Trial, named: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged]:
     """A `named` model with what describes what has no name in the last look at it, and what is to be said."""
-    model, selector = _held(named), found.selector
+    model, selector = named, found.selector
     for _ in range(_TIMES if found.remains else 0):
-        more = _with_more(trial, model, selector)
+        more = _with_more(trial, named, model, selector)
         if more is None:
             break
         model, selector = more, listed(more.view, vocabulary)
@@ -38,36 +43,57 @@ def described(
     if standing:
         judged = standing_in(judged, standing)
         found = weighed(model.view, selector, trial.progress)
-    best, judged = _with_force(trial, model, found, judged)
-    # with nothing to describe nothing is held
-    return (best if len(best.added) > len(named.added) else named), judged
+    return _with_force(trial, named, model, found, judged)
 
 
-def _held(model: Model) -> Model:
-    """The model with the numbers of all that was added to it held at what its fit says."""
-    own = [row.name for effect in model.added for row in parameter_table(effect).values()]
-    values = model.fit.vehicle.values()
-    led = model.view.vehicle.with_values({name: values[name] for name in own})
-    fit = dataclasses.replace(model.fit, vehicle=model.fit.vehicle.holding(own))
-    return model._replace(fit=fit, view=dataclasses.replace(model.view, vehicle=led.holding(own)))
-
-
-def _with_more(trial: Trial, model: Model, selector: Selector) -> Model | None:
+def _with_more(trial: Trial, named: Model, model: Model, selector: Selector) -> Model | None:
     """The model with what free runs ask for most, if those through the held-out runs err less with it.
 
-    What comes out of a fit with numbers that physics does not admit is asked for no more, and others instead.
+    What comes out of a fit with numbers that physics does not admit is asked for no more, and others instead; of what
+    does not help only the first half is tried again.
     """
+    asked = freest(selector)
     for _ in range(_TRIES):
-        asked = freest(selector)
         if not asked:
             return None
-        more = trial.with_effects(model, asked, selector.evidence.best([])[1].disturbance)
+        more = _fitted(trial, named, model, asked, selector.evidence.best([])[1].disturbance)
         wrong = {effect.label for effect in asked if not sound(more.fit, [effect])}
-        if not wrong:
-            gain = luck(model.shown, more.shown, True, freely=True)
-            return more if gain.helps and np.isfinite(gain.likelihood) else None
-        selector.usable[[effect.label in wrong for effect in selector.candidates]] = False
+        if wrong:
+            selector.usable[[effect.label in wrong for effect in selector.candidates]] = False
+            asked = freest(selector)
+        elif _helpful(luck(model.shown, more.shown, True, freely=True)):
+            return more
+        else:
+            asked = asked[: len(asked) // 2]
     return None
+
+
+def _helpful(gain: Luck) -> bool:
+    """Whether free runs err less, and none diverges."""
+    return gain.helps and bool(np.isfinite(gain.likelihood))
+
+
+def _fitted(
+    trial: Trial, named: Model, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance
+) -> Model:
+    """The model with some effects, in which what was named is known about as well as it was, or keeps its numbers."""
+    more = trial.with_effects(model, effects, disturbance)
+    own = [row.name for effect in named.added for row in parameter_table(effect).values()]
+    free = [name for name in own if name in more.fit.names]
+    if not free or not sound(more.fit, effects) or not float(more.fit.cost) < float(model.fit.cost):
+        return more
+    before, after = (allowing_for(one.view, one.fit).standard_errors for one in (named, more))
+    if all(after[name] < _ABOUT * before[name] for name in free):
+        return more
+    return trial.with_effects(_holding(model, named, own), effects, disturbance)
+
+
+def _holding(model: Model, named: Model, names: Sequence[str]) -> Model:
+    """The model with some numbers held at what they are where they were named."""
+    values = named.fit.vehicle.values()
+    held = lambda vehicle: vehicle.with_values({name: values[name] for name in names}).holding(names)
+    fit = dataclasses.replace(model.fit, vehicle=held(model.fit.vehicle))
+    return model._replace(fit=fit, view=dataclasses.replace(model.view, vehicle=held(model.view.vehicle)))
 
 
 def freest(selector: Selector) -> list[AbstractEffect]:
@@ -89,11 +115,14 @@ def freest(selector: Selector) -> list[AbstractEffect]:
     return [effect for effect, admitted in beside if admitted]
 
 
-def _with_force(trial: Trial, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
-    """The model with the force without a name, if it stands on the held-out runs."""
+def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
+    """The model with the force without a name, if what comes next or free runs stand on the held-out runs."""
     if found.pattern is None or not found.pattern.joins:
         return base, judged
     force = found.pattern.force
-    more = trial.with_effects(base, [force], found.naming.products.disturbance)
-    gain = luck(base.shown, more.shown, sound(more.fit, more.added), freely=False)
+    more = _fitted(trial, named, base, [force], found.naming.products.disturbance)
+    admitted = sound(more.fit, more.added)
+    gain = luck(base.shown, more.shown, admitted, freely=False)
+    freely = luck(base.shown, more.shown, admitted, freely=True)
+    gain = freely if _helpful(freely) and not gain.helps else gain
     return (more if gain.helps else base), helped(judged, force, gain)

@@ -1,5 +1,6 @@
 """What has no name is described by what free runs ask for, and what was named keeps its numbers."""
 
+import dataclasses
 import sys
 from types import SimpleNamespace
 
@@ -25,9 +26,9 @@ from jaxsub.estimate import fit
 class Freely(Selector):
     """What `freest` asks of a selector: shares of a free run's errors on top of others, and which signs it predicts."""
 
-    def __init__(self, candidates, shares, admitted):
+    def __init__(self, candidates, shares, admitted, disturbance=None):
         self.candidates, self.usable = candidates, np.ones(len(candidates), bool)
-        self.evidence = SimpleNamespace(best=lambda columns: (0.0, SimpleNamespace(disturbance=None)))
+        self.evidence = SimpleNamespace(best=lambda columns: (0.0, SimpleNamespace(disturbance=disturbance)))
         self.of_free_run = lambda chosen: np.array(shares[len(chosen)])
         self.freely_predicted = lambda chosen, index: (candidates[index], admitted(chosen, index))
 
@@ -59,10 +60,11 @@ def test_a_description_joins_where_something_is_left_and_free_runs_err_less(monk
     """Claim: a drag of the wrong sign goes and the rest stands; not where free runs are worse or nothing is left."""
     surge, yaw = QuadraticDamping("surge", -1.0), CubicDamping("yaw", -1.0)
     shares = [(0.3, 0.2), (0.0, 0.2), (0.0, 0.0)]
-    selector = Freely([surge, yaw], shares, lambda chosen, index: selector.usable[index])
     runs = batch(wrong(), recorded(None, 2)[:2])
     found = fit(wrong(), runs)
     named = Model(found, look(found), None, ())
+    admitted = lambda chosen, index: selector.usable[index]
+    selector = Freely([surge, yaw], shares, admitted, named.view.disturbance)
     fitted = lambda trial, model, effects, disturbance: model._replace(added=(*model.added, *effects))
     monkeypatch.setattr(Trial, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
@@ -83,6 +85,35 @@ def test_a_description_joins_where_something_is_left_and_free_runs_err_less(monk
     assert said.verdict == "unknown"
     assert said.named == []
     assert [surge.label in note for note in said.notes] == [True] * stands
+
+
+@pytest.mark.parametrize(("errors", "holds"), [(1.5, False), (3.0, True)])
+def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, errors, holds):
+    """Claim: a named moment is fitted again beside a drag, unless its standard error then grows more than twofold."""
+    effect, drag = HullAsymmetry("pitch", 250.0), QuadraticDamping("surge", -1.0)
+    found = fit(wrong().with_effect(effect), batch(wrong(), recorded(effect, 2)[:2]))
+    named = Model(found, look(found), None, (effect,))
+    own = next(name for name in found.names if name.startswith("hull-asymmetry"))
+    started = []
+
+    def fitted(trial, model, effects, disturbance):
+        row = next(row for row in model.fit.vehicle.layout.parameters if row.name == own)
+        started.append(row.free)
+        cheaper = dataclasses.replace(found, cost=0.5 * found.cost, covariance=errors**2 * found.covariance)
+        return model._replace(fit=cheaper, added=(*model.added, *effects))
+
+    monkeypatch.setattr(Trial, "with_effects", fitted)
+    path = sys.modules["jaxsub.discrepancy.stand_in"]
+    monkeypatch.setattr(path, "allowing_for", lambda view, fit: fit)
+    monkeypatch.setattr(path, "luck", lambda *given, freely: Luck(1.0, 0.01, 0.5, 0.01, given[2], freely))
+    monkeypatch.setattr(path, "listed", lambda *_: Freely([], [()], lambda *_: True))
+    monkeypatch.setattr(path, "weighed", lambda *_: seen(None, RANDOM))
+    selector = Freely([drag], [(0.3,), (0.0,)], lambda *_: True, named.view.disturbance)
+    trial = object.__new__(Trial)
+    object.__setattr__(trial, "progress", lambda message: None)
+    best, _ = described(trial, named, seen(selector, Memory(1e-9, 1.0)), Judged("named", [], 1e-9, []), None)
+    assert best.added == (effect, drag)
+    assert started == [True, False][: 1 + holds]
 
 
 def test_numbers_that_are_held_stay_through_every_search():
