@@ -22,7 +22,7 @@ from .trial import Found, Model, Trial
 from .verdict import Judged, helped, standing_in
 
 # effects that stand in at a time, sets of them that are fitted, and times that more are asked for
-_AT_ONCE, _TRIES, _TIMES = 4, 3, 3
+_AT_ONCE, _TRIES, _TIMES = 4, 5, 3
 # of the squared errors of a free run, the share that each must explain
 _ENOUGH = 0.05
 # times a standard error, to which it may grow beside a description
