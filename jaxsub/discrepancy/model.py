@@ -55,13 +55,17 @@ def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: f
 def sound(fit: Fit, effects: Sequence[AbstractEffect]) -> bool:
     """Whether all of `effects` came out of a fit with signs that physics admits, and none of them vanished.
 
-    A force whose memory is over within a sample is one without: what it then does, coefficients do.
+    A force whose memory is over within a sample is one without: what it then does, coefficients do. One whose memory
+    outlasts the runs is a constant in each, as large as the run's initial state, which is found anew for each.
     """
-    labels, interval = {effect.label for effect in effects}, float(np.min(fit.runs.steps))
+    labels, shortest = {effect.label for effect in effects}, float(np.min(fit.runs.steps))
+    longest = float(np.max(fit.runs.times))
     for effect in (e for e in fit.vehicle.effects if e.label in labels):
         found, linear, units = numbers(effect), amplitudes(effect), effect.units()
-        least = {n: interval if isinstance(effect, AbstractMemory) and units[n] == "s" else _VANISHED for n in found}
-        if not admissible(effect, found) or any(v <= least[n] for n, v in found.items() if n not in linear):
+        times = {n for n in found if isinstance(effect, AbstractMemory) and units[n] == "s"}
+        least = {n: shortest if n in times else _VANISHED for n in found}
+        vanished = any(v <= least[n] for n, v in found.items() if n not in linear)
+        if vanished or not admissible(effect, found) or any(found[n] >= longest for n in times):
             return False
     return True
 

@@ -165,9 +165,9 @@ def test_an_instrument_is_one_column_in_all_its_channels_and_its_trace_is_theirs
 
 
 @pytest.mark.parametrize(
-    ("samples", "coefficient", "stands"), [(4.0, -9.0, True), (0.3, -9.0, False), (4.0, 9.0, False)]
+    ("samples", "coefficient", "stands"), [(4.0, -9.0, True), (0.3, -9.0, False), (4.0, 9.0, False), (1e9, -9.0, False)]
 )
-def test_a_memory_that_is_over_within_a_sample_or_drives_is_unsound(fitted, samples, coefficient, stands):
+def test_a_memory_within_a_sample_or_beyond_the_runs_or_that_drives_is_unsound(fitted, samples, coefficient, stands):
     memory = FluidMemory("pitch", coefficient, samples * INTERVAL)
     found = dataclasses.replace(fitted, vehicle=fitted.vehicle.with_effect(memory))
     assert sound(found, [memory]) is stands
