@@ -89,7 +89,7 @@ def _gain_said(label: str, gain: Luck) -> str:
 def standing_in(judged: Judged, effects: Sequence[AbstractEffect]) -> Judged:
     """The verdict with a word on effects that are in the model and were not named."""
     labels = ", ".join(effect.label for effect in effects)
-    note = f"Free runs through the held-out runs err less with {labels}, which stand in for what has no name."
+    note = f"Free runs through the held-out runs err less with {labels}, standing in for what has no name."
     return dataclasses.replace(judged, notes=[*judged.notes, note])
 
 
