@@ -105,12 +105,12 @@ def freest(selector: Selector) -> list[AbstractEffect]:
     while len(chosen) < _AT_ONCE:
         share = selector.of_free_run(chosen)
         taken = {selector.candidates[i].label for i in chosen}
-        may = [i for i in np.argsort(-share) if selector.usable[i] and selector.candidates[i].label not in taken]
+        may = [int(i) for i in np.argsort(-share) if selector.usable[i] and selector.candidates[i].label not in taken]
         moves = (i for i in may if not isinstance(selector.candidates[i], AbstractInstrument))
         best = next((i for i in moves if selector.freely_predicted(chosen, i)[1]), None)
         if best is None or share[best] < _ENOUGH:
             break
-        chosen.append(int(best))
+        chosen.append(best)
     beside = [selector.freely_predicted([j for j in chosen if j != i], i) for i in chosen]
     return [effect for effect, admitted in beside if admitted]
 

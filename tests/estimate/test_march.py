@@ -67,8 +67,9 @@ def both(request):
 
 
 def close(found, expected):
+    # a gradient is what is left of larger terms
     for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(expected), strict=True):
-        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-11 * float(jnp.max(jnp.abs(other))))
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-10 * float(jnp.max(jnp.abs(other))))
 
 
 def test_cost_and_expansion_are_those_of_jax(both):

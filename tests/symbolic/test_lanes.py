@@ -12,7 +12,7 @@ from jaxsub.errors import InputError
 from jaxsub.symbolic.lanes import HEADER, lanes_c
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
-LANES = 8
+MEMBERS = 8
 ALIKE = "sqrt sin cos tan sinh cosh tanh exp expm1 log log1p floor ceil fabs sign"
 ONE = {name: getattr(np, name) for name in ALIKE.split()}
 ONE |= {"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "logic_not": lambda x: 1.0 * (x == 0.0)}
@@ -21,23 +21,32 @@ TWO |= {"power": np.power, "logic_and": np.logical_and, "logic_or": np.logical_o
 
 
 def in_lanes(function, given, folder, flags):
-    """The function's C on numbers (arguments, LANES), compiled with those flags."""
+    """The function's C on numbers (arguments, MEMBERS), compiled with those flags, as many at once as it has lanes."""
     source = HEADER.read_text() + lanes_c(function)
-    source += f"void all(const V *x, V *y) {{ {function.name()}(x, y); }}\n"
+    source += f"int lanes(void) {{ return LANES; }}\nvoid all(const V *x, V *y) {{ {function.name()}(x, y); }}\n"
     (folder / "lanes.c").write_text(source)
     for last in (["-lmvec", "-lm"], ["-lm"]):
         command = ["cc", *flags, "-Wno-psabi", "-shared", "-fPIC", str(folder / "lanes.c"), "-o", str(folder / "l.so")]
         if subprocess.run([*command, *last], capture_output=True).returncode == 0:
             break
-    memory = np.zeros((function.nnz_in(0) + function.nnz_out(0) + 1, LANES))
+    whole = ctypes.CDLL(str(folder / "l.so"))
+    lanes = whole.lanes()
+    assert MEMBERS % lanes == 0
+    parts = [called(whole, part, function.nnz_out(0)) for part in np.split(given, MEMBERS // lanes, axis=1)]
+    return np.concatenate(parts, axis=1)
+
+
+def called(whole, given, results):
+    """The results (results, lanes) of one call on numbers (arguments, lanes)."""
+    arguments, lanes = given.shape
+    memory = np.zeros((arguments + results + 1, lanes))
     # vectors lie at whole multiples of their size
-    offset = -memory.ctypes.data % (8 * LANES) // 8
+    offset = -memory.ctypes.data % (8 * lanes) // 8
     flat = memory.ravel()[offset:]
     flat[: given.size] = given.ravel()
-    whole = ctypes.CDLL(str(folder / "l.so"))
     at = flat.ctypes.data
     whole.all(ctypes.c_void_p(at), ctypes.c_void_p(at + 8 * given.size))
-    return flat[given.size : given.size + LANES * function.nnz_out(0)].reshape(-1, LANES).copy()
+    return flat[given.size : given.size + lanes * results].reshape(-1, lanes).copy()
 
 
 @pytest.mark.parametrize("flags", [["-O2", "-ftree-vectorize", "-march=native", "-fno-math-errno"], ["-O0"]])
@@ -59,7 +68,7 @@ def test_every_operation_is_numpys(tmp_path, flags):
         casadi.if_else(a < b, a, 7.0),
         a**3.7,
     ]
-    given = np.random.default_rng(3).uniform(0.05, 0.95, (2, LANES))
+    given = np.random.default_rng(3).uniform(0.05, 0.95, (2, MEMBERS))
     given[1, 2] = given[0, 2]
     p, q = given
     expected = [f(p) for f in ONE.values()] + [f(p, q) for f in TWO.values()]
@@ -85,7 +94,7 @@ def test_what_is_not_chosen_is_not_seen(tmp_path):
     """A NaN on the other side of a choice leaves no trace, whichever lane it is in."""
     x = casadi.SX.sym("x")
     root = casadi.if_else(x > 0.0, casadi.sqrt(x), -1.0)
-    given = np.linspace(-2.0, 2.0, LANES)
+    given = np.linspace(-2.0, 2.0, MEMBERS)
     answer = in_lanes(casadi.Function("f", [x], [root]), given[None], tmp_path, ["-O2"])
     np.testing.assert_allclose(answer[0], np.where(given > 0.0, np.sqrt(np.abs(given)), -1.0), rtol=1e-15)
 
