@@ -121,8 +121,7 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
         return base, judged
     force = found.pattern.force
     more = _fitted(trial, named, base, [force], found.naming.products.disturbance)
-    admitted = sound(more.fit, more.added)
-    gain = luck(base.shown, more.shown, admitted, freely=False)
-    freely = luck(base.shown, more.shown, admitted, freely=True)
+    gain = luck(base.shown, more.shown, sound(more.fit, more.added), freely=False)
+    freely = gain._replace(freely=True)
     gain = freely if _helpful(freely) and not gain.helps else gain
     return (more if gain.helps else base), helped(judged, force, gain)
