@@ -18,7 +18,7 @@ from .columns import force_columns
 from .evidence import Evidence, Products
 from .hats import hats, promising, smooth_forces
 from .selector import SIGNIFICANCE
-from .smoothness import FINE, SCALES, coarse, smoothest
+from .smoothness import FINE, SCALES, Smooth, coarse, smoothest
 from .view import View
 
 # of a disturbance, part or most of which may be this force
@@ -115,8 +115,9 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     p_value = min(1.0, 0.5 * len(forces) * len(SCALES) * float(special.chdtrc(1, 2.0 * max(0.0, gain))))
     # how large it is is a number of the force, as probable before the data as others; so is which force it is
     alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
-    heights, explained = found.heights(at)
-    force, near = found.nearest(at, weighed[best], heights)
+    heights, size, explained = found.heights(at)
+    force = dataclasses.replace(weighed[best], spread=float(f"{size:.6g}"))
+    force, near = found.nearest(at, force, heights)
     return Pattern(force, heights, near, p_value, found.predicts(), alone, explained)
 
 
@@ -157,10 +158,10 @@ class _Weighed:
         gain = lambda p: smoothest(p, held, self.own, self.length).gain
         return np.array([p.log_evidence(held) + gain(p) for p in self.evidence.products])
 
-    def together(self, products: Products) -> tuple[Products, np.ndarray]:
+    def together(self, products: Products) -> tuple[Products, Smooth]:
         """Products of what was chosen and of the columns of the force's prior, and what hats these are made of."""
-        weights = smoothest(products, self.held, self.own, self.length).weights
-        return products.mixed(self.held, self.own, weights), weights
+        smooth = smoothest(products, self.held, self.own, self.length)
+        return products.mixed(self.held, self.own, smooth.weights), smooth
 
     def predicts(self) -> bool:
         """Whether parts of the recordings are better predicted with the force, each under what suits it."""
@@ -168,13 +169,14 @@ class _Weighed:
         with_it = max(float(np.sum(self.together(p)[0].predicted([*self.held, *self.own]))) for p in products)
         return with_it > max(float(np.sum(p.predicted(self.held))) for p in products)
 
-    def heights(self, at: int) -> tuple[np.ndarray, float]:
-        """Of the force, and the share of what it and the chosen explain that the chosen explain alone."""
-        both, weights = self.together(self.evidence.products[at])
+    def heights(self, at: int) -> tuple[np.ndarray, float, float]:
+        """Of the force, how far from zero before the data, and the share of what all explain that the chosen do."""
+        both, smooth = self.together(self.evidence.products[at])
         gains = both.gains(self.held, [self.own])
         fall = both.fall(self.held)
         explained = fall / max(fall + float(gains.statistic[0]), 1e-300)
-        return weights @ gains.amplitudes[0] / self.length, float(np.clip(explained, 0.0, 1.0))
+        heights = smooth.weights @ gains.amplitudes[0] / self.length
+        return heights, smooth.size, float(np.clip(explained, 0.0, 1.0))
 
     def nearest(self, at: int, force: SmoothForce, heights: np.ndarray) -> tuple[SmoothForce, float]:
         """The force with the numbers that are nearest to `heights` along the motion, and how near they are."""

@@ -16,6 +16,7 @@ Assoc. 82, on the likelihood ratio of a variance at its bound.
 """
 
 import functools
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -37,18 +38,20 @@ _ROUNDING = 1e-8
 class Smooth(NamedTuple):
     """What the likeliest smooth function gains in log evidence, and by which weights hats become columns of its prior.
 
-    The columns' amplitudes are independent before the data, and worth one sample. (FINE, FINE).
+    The columns' amplitudes are independent before the data, and worth one sample. (FINE, FINE). `size`: s, infinite
+    where no such function gains.
     """
 
     gain: float
     weights: np.ndarray
+    size: float
 
 
 def smoothest(products: Products, chosen: Sequence[int], hats: Sequence[int], length: np.ndarray) -> Smooth:
     """The likeliest smooth function on top of the candidates `chosen`, its `hats` being of these lengths."""
     G, b = products.remaining(chosen, hats)
     G, b = G * np.outer(length, length), b * length
-    best = Smooth(0.0, np.zeros_like(G))
+    best = Smooth(0.0, np.zeros_like(G), math.inf)
     for L in _roots():
         values, U = np.linalg.eigh(L.T @ G @ L)
         values, c = np.maximum(values, 0.0), U.T @ (L.T @ b)
@@ -57,7 +60,8 @@ def smoothest(products: Products, chosen: Sequence[int], hats: Sequence[int], le
         gains = 0.5 * np.sum(sizes[:, None] * c**2 / (1.0 + spread) - np.log1p(spread), axis=1)
         i = int(np.argmax(gains))
         if gains[i] > best.gain:
-            best = Smooth(float(gains[i]), length[:, None] * L * np.sqrt(sizes[i] / products.samples))
+            weights = length[:, None] * L * np.sqrt(sizes[i] / products.samples)
+            best = Smooth(float(gains[i]), weights, float(np.sqrt(sizes[i])))
     return best
 
 

@@ -27,6 +27,8 @@ _AT_ONCE, _TRIES, _TIMES = 4, 5, 3
 _ENOUGH = 0.05
 # times a standard error, to which it may grow beside a description
 _ABOUT = 2.0
+# of how far from zero a force without a name was found to be
+_SHARES = (1.0, 0.5, 0.25)
 
 
 def described(
@@ -116,12 +118,19 @@ def freest(selector: Selector) -> list[AbstractEffect]:
 
 
 def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
-    """The model with the force without a name, if what comes next or free runs stand on the held-out runs."""
+    """The model with the force without a name, if what comes next or free runs stand on the held-out runs.
+
+    How far from zero it is was asked of its shape in detail, and its few knots may overdo it: so half of that is tried.
+    """
     if found.pattern is None or not found.pattern.joins:
         return base, judged
-    force = found.pattern.force
-    more = _fitted(trial, named, base, [force], found.naming.products.disturbance)
-    gain = luck(base.shown, more.shown, sound(more.fit, more.added), freely=False)
-    freely = gain._replace(freely=True)
-    gain = freely if _helpful(freely) and not gain.helps else gain
-    return (more if gain.helps else base), helped(judged, force, gain)
+    force, disturbance = found.pattern.force, found.naming.products.disturbance
+    for share in _SHARES:
+        less = dataclasses.replace(force, spread=share * force.spread)
+        more = _fitted(trial, named, base, [less], disturbance)
+        gain = luck(base.shown, more.shown, sound(more.fit, more.added), freely=False)
+        freely = gain._replace(freely=True)
+        gain = freely if _helpful(freely) and not gain.helps else gain
+        if gain.helps:
+            return more, helped(judged, less, gain)
+    return base, helped(judged, force, gain)

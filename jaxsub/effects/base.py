@@ -27,6 +27,11 @@ def shape(unit: str, sign: int = 0, default: float = 0.0) -> Any:
     return _field("shape", unit, sign, default)
 
 
+def edge() -> Any:
+    """A static number of either sign, where something begins or ends; other static numbers are sizes, and positive."""
+    return eqx.field(static=True, metadata={"signed": True})
+
+
 def _field(role: str, unit: str, sign: int, default: float, most: float = math.inf) -> Any:
     return eqx.field(
         default_factory=lambda: number(default),
@@ -78,6 +83,10 @@ class AbstractEffect(eqx.Module):
     def units(self) -> dict[str, str]:
         """The unit of each numeric field."""
         return {field.name: field.metadata["unit"] for field in number_fields(self)}
+
+    def prior_std(self) -> dict[str, float]:
+        """How far from zero numeric fields are before the data, one standard deviation, where that is known."""
+        return {}
 
     def signs(self) -> dict[str, int]:
         """The only sign that physics admits of each numeric field, +1 or -1; 0 admits both."""
@@ -231,13 +240,13 @@ def options(effect: AbstractEffect) -> dict[str, Any]:
 def parameter_table(effect: AbstractEffect) -> dict[str, Parameter]:
     """A free `Parameter` for each numeric field. Signs are judged after the fit, not forced in it: a fit that wants
     a negative drag is evidence against the effect, and a bound would hide it."""
-    symbols, units, signs = effect.symbols(), effect.units(), effect.signs()
+    symbols, units, signs, spread = effect.symbols(), effect.units(), effect.signs(), effect.prior_std()
     rows = {}
     for field in number_fields(effect):
         # a shape such as a time constant has no meaning below zero, so there the bound is the physics
         lower = 0.0 if field.metadata["role"] == "shape" and signs[field.name] > 0 else -math.inf
         name = f"{effect.label}.{symbols[field.name]}"
-        rows[field.name] = Parameter(name, units[field.name], lower=lower)
+        rows[field.name] = Parameter(name, units[field.name], lower=lower, prior_std=spread.get(field.name, math.inf))
     return rows
 
 

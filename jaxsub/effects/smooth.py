@@ -1,6 +1,7 @@
 """A force that follows one variable smoothly: what is left to say where nothing in the vocabulary fits."""
 
 import functools
+import math
 import operator
 from collections.abc import Sequence
 from typing import ClassVar
@@ -9,7 +10,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from .base import AbstractForce, amplitude
+from ..errors import InputError
+from .base import AbstractForce, amplitude, edge
 from .motion import FORCES, Facts, Motion, Signal, by_name, unit_per
 
 KNOTS = 12
@@ -19,15 +21,18 @@ class SmoothForce(AbstractForce):
     r"""A force that is a piecewise line in one variable: $\tau_i = \sum_j a_j\,\Lambda_j(x)$.
 
     $\Lambda_j$ are hats at `KNOTS` equidistant places from `low` to `high`; beyond them the force stays what it is at
-    the end. It describes and does not explain: it is no candidate, and joins a model whose mismatch has no name.
+    the end. It describes and does not explain: it is no candidate, and joins a model whose mismatch has no name. Each
+    a_j is Gaussian about zero before the data, of standard deviation `spread`, N or N m: so what a coefficient can do,
+    such as damping what a line through the knots can, is left to it.
     """
 
     name: ClassVar[str] = "smooth-force"
     family: ClassVar[str] = "description"
     equation: str = eqx.field(static=True)
     variable: str = eqx.field(static=True)
-    low: float = eqx.field(static=True)
-    high: float = eqx.field(static=True)
+    low: float = edge()
+    high: float = edge()
+    spread: float = eqx.field(static=True, default=math.inf)
     a_0: Array = amplitude("1")
     a_1: Array = amplitude("1")
     a_2: Array = amplitude("1")
@@ -46,6 +51,12 @@ class SmoothForce(AbstractForce):
         """None: it is not a name for anything."""
         return []
 
+    def __check_init__(self):
+        if not self.low < self.high:
+            raise InputError(
+                self.label, f"its low {self.low:g} is not below its high {self.high:g}", "mend one of them"
+            )
+
     @property
     def where(self) -> tuple[str, ...]:
         """The one equation."""
@@ -54,6 +65,10 @@ class SmoothForce(AbstractForce):
     def units(self) -> dict[str, str]:
         """A force or a moment."""
         return dict.fromkeys((f"a_{j}" for j in range(KNOTS)), unit_per(self.equation))
+
+    def prior_std(self) -> dict[str, float]:
+        """The same for all."""
+        return dict.fromkeys((f"a_{j}" for j in range(KNOTS)), self.spread)
 
     @property
     def expression(self) -> str:

@@ -1,6 +1,7 @@
 """A fit as a least-squares problem in unbounded, scaled coordinates."""
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import equinox as eqx
@@ -73,8 +74,9 @@ class Problem(eqx.Module):
         values = vehicle.values()
         theta = np.array([float(values[row.name]) for row in rows])
         own = vehicle.own_values()
-        # an effect starts at its fitted or predicted size, which is no prior knowledge
-        means = [row.prior_mean if row.name in own else float(values[row.name]) for row in rows]
+        # an effect without a prior starts at its fitted or predicted size, which is no prior knowledge
+        known = lambda row: row.name in own or math.isfinite(row.prior_std)
+        means = [row.prior_mean if known(row) else float(values[row.name]) for row in rows]
         guess, spread = initial_guess(vehicle, runs)
         transform = Transform.of(rows, theta)
         return cls(

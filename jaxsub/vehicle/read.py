@@ -1,6 +1,7 @@
 """Vehicle files in: TOML to a vehicle (formats.md)."""
 
 import dataclasses
+import math
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -113,7 +114,7 @@ def _read_effects(
         chosen = {field.name.rstrip("_"): field for field in _option_fields(kind)}
         table.only(("effect", "expression", "parameters", *chosen))
         place = f"{where}: effects[{number}]"
-        named = {field.name: read_option(table, key, field.type) for key, field in chosen.items()}
+        named = {field.name: read_option(table, key, field) for key, field in chosen.items()}
         try:
             effect = kind(**named)
         except InputError as error:  # options that do not go together; it does not know the file
@@ -127,7 +128,8 @@ def _read_effects(
             old = table_rows[symbols[symbol]]
             at = f"{place}.parameters.{symbol}"
             values[symbols[symbol]], row = read_number(old.name, item, at, free=True, lower=old.lower, unit=old.unit)
-            table_rows[symbols[symbol]] = row
+            own = {} if math.isfinite(row.prior_std) else {"prior_std": old.prior_std, "prior_mean": old.prior_mean}
+            table_rows[symbols[symbol]] = dataclasses.replace(row, **own)
         effects.append(kind(**options(effect), **values))
         rows += list(table_rows.values())
     return tuple(effects), tuple(rows)

@@ -1,5 +1,6 @@
 """Reading the pieces of a vehicle file, with errors that say where, what and what to do."""
 
+import dataclasses
 import math
 from typing import Any
 
@@ -96,12 +97,14 @@ def read_number(
     return value, Parameter(name, unit, not fixed, low, high, prior, value)
 
 
-def read_option(table: Table, key: str, form: Any) -> Any:
-    """A static choice of an effect: a word, a positive size or, where `form` is a tuple's type, a tuple of words."""
-    value = table.required(key)
+def read_option(table: Table, key: str, field: dataclasses.Field) -> Any:
+    """A static choice of an effect: a word, words, a positive size or an edge, as its `field` says."""
+    if key not in table.data and field.default is not dataclasses.MISSING:
+        return field.default
+    value, form = table.required(key), field.type
     if form is str and not isinstance(value, str):
         raise InputError(table.place(key), f"{value!r} is not a word", f'write {key} = "…"')
-    if form is float and not (value := _finite(value, table.place(key))) > 0.0:
+    if form is float and not (value := _finite(value, table.place(key))) > 0.0 and "signed" not in field.metadata:
         raise InputError(table.place(key), f"is {value:g}", "give a positive number")
     return value if form in (str, float) else table.names(key)
 

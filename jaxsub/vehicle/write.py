@@ -1,5 +1,6 @@
 """Vehicle files out: a vehicle to TOML (formats.md)."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -72,21 +73,25 @@ def _body_table(vehicle: SubmergedBody, values: dict[str, float], rows: dict[str
 def _effect_table(effect: AbstractEffect, rows: dict[str, Parameter]) -> Any:
     table = tomlkit.table()
     table["effect"] = effect.name
-    for name, value in options(effect).items():
+    given = {name: value for name, value in options(effect).items() if value != math.inf}
+    for name, value in given.items():
         table[name.rstrip("_")] = list(value) if isinstance(value, tuple) else value
     table["expression"] = effect.expression
-    symbols = effect.symbols()
-    table["parameters"] = {
-        symbols[field]: _number_table(float(getattr(effect, field)), rows.get(row.name), free=True)
-        for field, row in parameter_table(effect).items()
-    }
+    symbols, numbers = effect.symbols(), parameter_table(effect)
+    written = lambda field, row: _number_table(
+        float(getattr(effect, field)), rows.get(row.name), free=True, prior_std=row.prior_std
+    )
+    table["parameters"] = {symbols[field]: written(field, row) for field, row in numbers.items()}
     return table
 
 
-def _number_table(value: float, row: Parameter | None, *, free: bool) -> Any:
-    """A bare number where a body entry is plain, else an inline table; `free` is what the file takes for granted."""
+def _number_table(value: float, row: Parameter | None, *, free: bool, prior_std: float = math.inf) -> Any:
+    """A bare number where a body entry is plain, else an inline table.
+
+    `free` and `prior_std` are what the file takes for granted.
+    """
     row = row or Parameter("", free=False)
-    bounded, informed = np.isfinite([row.lower, row.upper]).any(), np.isfinite(row.prior_std)
+    bounded, informed = np.isfinite([row.lower, row.upper]).any(), row.prior_std != prior_std
     if not free and not row.free:
         return value
     table = tomlkit.inline_table()

@@ -9,6 +9,7 @@ import pytest
 from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.generic import Pattern
 from jaxsub.discrepancy.model import join
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.show import Luck
@@ -17,6 +18,7 @@ from jaxsub.discrepancy.trial import Found, Model, Trial
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM, Memory
+from jaxsub.effects import SmoothForce
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.sensors import SensorScale
@@ -46,10 +48,11 @@ def test_stands_in_what_moves_the_vehicle_and_explains_enough_of_free_runs():
     assert freest(Freely([surge, yaw], [(0.3, 0.2), (0.3, 0.2), (0.0, 0.0)], turned)) == [yaw]
 
 
-def seen(selector, memory):
-    """A last look at recordings, of which only the selector and what is left matter."""
+def seen(selector, memory, pattern=None, disturbance=None):
+    """A last look at recordings, of which only the selector, what is left and a force without a name matter."""
     found = object.__new__(Found)
-    parts = {"naming": None, "pattern": None, "memory": memory, "view": None, "selector": selector}
+    naming = SimpleNamespace(products=SimpleNamespace(disturbance=disturbance))
+    parts = {"naming": naming, "pattern": pattern, "memory": memory, "view": None, "selector": selector}
     for name, value in parts.items():
         object.__setattr__(found, name, value)
     return found
@@ -85,6 +88,26 @@ def test_a_description_joins_where_something_is_left_and_free_runs_err_less(monk
     assert said.verdict == "unknown"
     assert said.named == []
     assert [surge.label in note for note in said.notes] == [True] * stands
+
+
+@pytest.mark.parametrize(("most", "stands"), [(9.0, 8.0), (5.0, 4.0), (1.0, None)])
+def test_a_force_that_overdoes_it_is_tried_by_halves(monkeypatch, most, stands):
+    """Claim: of a force that was found to be 8 N from zero half and a quarter are tried, and the largest that helps."""
+    force = SmoothForce("surge", "u", -1.0, 1.0, 8.0)
+    pattern = Pattern(force, np.zeros(2), 1.0, 1e-9, True, 0.0, 0.0)
+    found = fit(wrong(), batch(wrong(), recorded(None, 2)[:2]))
+    named = Model(found, look(found), None, ())
+    fitted = lambda trial, model, effects, disturbance: model._replace(shown=effects[0].spread, added=tuple(effects))
+    monkeypatch.setattr(Trial, "with_effects", fitted)
+    path = sys.modules["jaxsub.discrepancy.stand_in"]
+    gained = lambda before, after, sound, *, freely: Luck(1.0, 0.01 if after < most else 1.0, 1.0, 1.0, sound, freely)
+    monkeypatch.setattr(path, "luck", gained)
+    trial = object.__new__(Trial)
+    left = seen(Freely([], [()], lambda *_: True), Memory(1e-9, 1.0), pattern, named.view.disturbance)
+    best, said = described(trial, named, left, Judged("unknown", [], 1e-9, []), None)
+    assert [effect.spread for effect in best.added] == ([] if stands is None else [stands])
+    assert (best is named) is (stands is None)
+    assert [force.label in note for note in said.notes] == [True]
 
 
 @pytest.mark.parametrize(("errors", "holds"), [(1.5, False), (3.0, True)])

@@ -9,7 +9,8 @@ from rigs import driven, oscillator, recorded, stacked
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
-from jaxsub.estimate import fit, initial_guess, search
+from jaxsub.effects import KNOTS, SmoothForce
+from jaxsub.estimate import Problem, fit, initial_guess, search
 from jaxsub.results import RESULTS
 from jaxsub.simulate import synthetic
 from jaxsub.vehicle.catalogue import dsrv
@@ -116,6 +117,18 @@ def test_prior_weighs_against_the_data_as_their_precisions_do():
     told = fit(oscillator(coefficients=fixed | {"K_x": {"value": 4.006, "prior_std": size}}), runs)
     np.testing.assert_allclose(told.values["K_x"], 0.5 * (free.values["K_x"] + 4.006), atol=0.02 * size)
     np.testing.assert_allclose(told.standard_errors["K_x"], size / np.sqrt(2.0), rtol=0.02)
+
+
+def test_spread_of_a_smooth_force_weighs_its_heights_about_zero_wherever_they_begin():
+    """Claim: the cost with heights a of spread s is that without a spread and ½ Σ (a/s)², the search's start too."""
+    begun = {f"a_{j}": jnp.asarray(0.1 * (-1.0) ** j) for j in range(KNOTS)}
+    vehicles = [oscillator().with_effect(SmoothForce("x", "x_rate", -1.0, 1.0, s, **begun)) for s in (0.2, np.inf)]
+    sigma, still = jnp.array([0.01, 0.02]), jnp.zeros((2, 2))
+    told, free = (Problem.of(v, records(1), sigma, still, known_start=True) for v in vehicles)
+    for y in (told.origin, 0.5 * told.origin):
+        a = np.array([v for name, v in told.vehicle_at(y).values().items() if name.startswith("smooth-force")])
+        assert len(a) == KNOTS
+        np.testing.assert_allclose(float(told.cost(y) - free.cost(y)), 0.5 * np.sum((a / 0.2) ** 2), rtol=1e-6)
 
 
 def test_noise_to_be_estimated_is_the_rms_of_what_is_left():

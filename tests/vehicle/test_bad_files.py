@@ -46,6 +46,8 @@ outputs.x_rate.sigma = 0.1
 effects = [{ effect = "coulomb-friction", equation = "x", smoothing = 0.1 }]
 """
 SWAY = 'equation = "sway"\nparameters = { Y_vv = -3.0 }'
+DRAG = '"quadratic-damping"\n' + SWAY
+SMOOTH = '"smooth-force"\nequation = "sway"\nvariable = "sway"\nlow = -1.0\nhigh = '
 BIAS = '"sensor-bias"\nchannel = "r"'
 ARM = '"sensor-lever-arm"\nchannel = "r"\naxis = "x"'
 TURNED = '"sensor-misalignment"\nchannel = "r"\nsees = "u"'
@@ -91,6 +93,8 @@ MISTAKES = {
     "effect without option": ('equation = "sway"\n', "", r": effects\[1\].equation: is missing; "),
     "option a number": ('equation = "sway"', "equation = 3", r": effects\[1\].equation: 3 is not a word; "),
     "locked equation": (SWAY, 'equation = "heave"', r": effects\[1\] .*: acts on heave; free that in dof: sway, "),
+    "edges in the wrong order": (DRAG, SMOOTH + "-2.0", r": effects\[1\]: .*is not below its high "),
+    "spread of nothing": (DRAG, SMOOTH + "2.0\nspread = 0.0", r": effects\[1\].spread: is 0; give a positive number"),
     "unknown equation": (SWAY, 'equation = "swya"', r": effects\[1\] .*: swya: unknown key; did you mean sway?"),
     "unknown parameter": ("Y_vv =", "Y_rr =", r": effects\[1\].parameters.Y_rr: unknown key; known: Y_vv"),
     "effect of no actuator": ('actuator = "rudder"', 'actuator = "ruder"', r": effects.*no actuator ruder; use rudder"),

@@ -1,6 +1,7 @@
 """A vehicle with any effect of the vocabulary is written and read back the same, and answers the same and finitely."""
 
 import dataclasses
+import tomllib
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +11,9 @@ from rigs import body, chosen, coupled, driven, stacked
 from jaxsub.effects import (
     VOCABULARY,
     AbstractMemory,
+    SmoothForce,
     WaveForcing,
+    options,
 )
 from jaxsub.simulate import at_rest, simulate
 from jaxsub.vehicle import read_vehicle, vehicle_from, vehicle_text, write_vehicle
@@ -39,6 +42,20 @@ def test_a_vehicle_with_every_effect_reads_back_the_same_and_answers_the_same(pl
     assert np.isfinite(one).all()
     assert np.abs(one - without).max() > 0.01
     np.testing.assert_array_equal(one, two)
+
+
+def test_a_smooth_force_keeps_its_edges_and_what_is_known_of_its_heights(tmp_path):
+    """Claim: edges of either sign and the spread are read back, and the heights' prior is about zero."""
+    force = SmoothForce("heave", "w", -0.4, 0.3, 2.5, a_0=jnp.asarray(1.7))
+    write_vehicle(BODY.with_effect(force), tmp_path / "vehicle.toml")
+    again = read_vehicle(tmp_path / "vehicle.toml")
+    assert options(again.effects[0]) == options(force)
+    rows = [row for row in again.layout.parameters if row.name.startswith(force.label)]
+    assert {(row.prior_mean, row.prior_std) for row in rows} == {(0.0, 2.5)}
+    assert float(again.values()[f"{force.label}.a_0"]) == 1.7
+    unknown = dataclasses.replace(force, spread=np.inf)
+    assert "spread" not in vehicle_text(BODY.with_effect(unknown))
+    assert vehicle_from(tomllib.loads(vehicle_text(BODY.with_effect(unknown))), "").effects[0].spread == np.inf
 
 
 def test_an_effect_that_is_taken_away_leaves_the_vehicle_as_it_was():
