@@ -220,6 +220,8 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
         channel = next((c for c in aliases.get(name, (name,)) if c in layout.channels), None)
         if channel is None:
             guess[:, i] = float(vehicle.own_values()["speed"]) if body and name == "u" else 0.0
+            if (coordinate := name.removesuffix("_rate")) in layout.channels:
+                spread[i] = max(spread[i], _fastest(runs, layout.channels.index(coordinate)))
             continue
         column = layout.channels.index(channel)
         for run in range(len(guess)):
@@ -228,6 +230,14 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
         # wide enough that the prior weighs nothing against the channel's own first samples
         spread[i] = max(spread[i], _std(outputs[..., column][mask[..., column]]))
     return jnp.asarray(guess), jnp.asarray(spread)
+
+
+def _fastest(runs: Runs, column: int) -> float:
+    """The largest rate of a channel between two samples that follow each other."""
+    steps, mask = np.asarray(runs.steps)[np.asarray(runs.step_of)], np.asarray(runs.mask)[..., column]
+    there = np.asarray(runs.live) & mask[:, 1:] & mask[:, :-1]
+    change = np.diff(np.asarray(runs.outputs)[..., column])
+    return float(np.max(np.abs(change[there]) / steps[there], initial=0.0))
 
 
 def _std(samples: np.ndarray) -> float:

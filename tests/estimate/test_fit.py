@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from jaxsub.effects import KNOTS, SmoothForce
 from jaxsub.estimate import Problem, fit, initial_guess, search
 from jaxsub.results import RESULTS
-from jaxsub.simulate import synthetic
+from jaxsub.simulate import simulate, synthetic
 from jaxsub.vehicle.catalogue import dsrv
 
 NAMES = ("D_x", "K_x", "B_x_drive")
@@ -137,6 +137,17 @@ def test_noise_to_be_estimated_is_the_rms_of_what_is_left():
     left = np.sqrt(np.mean(np.asarray(found.model.error) ** 2, (0, 1)))
     np.testing.assert_allclose(found.sigma, [left[0], 0.02], rtol=3e-3)
     assert abs(found.sigma[0] / 0.01 - 1.0) < 4.0 / np.sqrt(2 * 160)
+
+
+def test_rate_that_nothing_measures_begins_as_fast_as_its_coordinate_moves():
+    """Claim: a coordinate of 400 rad/s begins at its true 60/s though the noise is said to be a third of its motion."""
+    fast = {"D_x": 40.0, "K_x": 160_000.0, "B_x_drive": 1.0}
+    vehicle = oscillator(coefficients=fast, outputs={"x": {"sigma": 0.05}})
+    runs = stacked(vehicle, [driven(vehicle, 0.001 * np.arange(200), seed=1)])
+    start = jnp.array([[60.0, 0.0]])
+    runs = dataclasses.replace(runs, outputs=simulate(vehicle, runs, start), mask=jnp.ones_like(runs.mask))
+    _, found, *_ = search(vehicle, runs, moving=False)
+    np.testing.assert_allclose(found, start, rtol=0.02, atol=0.002)
 
 
 def test_first_measured_sample_starts_the_search_whatever_a_coordinate_is_called():
