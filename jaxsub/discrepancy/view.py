@@ -179,10 +179,10 @@ def _apart(found: Iterable["_At"]) -> list["_At"]:
 
 
 def _settled(led: "_Led", at: "_At") -> "_At":
-    """Both, in turns until they stay."""
+    """Both, in turns until they stay; what has no finite cost stays."""
     for _ in range(_TURNS):
         before, at = at, _turned(led, at)
-        if abs(before.cost - at.cost) < _SETTLED:
+        if not abs(before.cost - at.cost) >= _SETTLED:
             break
     return at
 

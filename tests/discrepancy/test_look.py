@@ -1,6 +1,7 @@
 """How a model is led along its recordings, and which searches for its disturbance go on."""
 
 import dataclasses
+import math
 
 import pytest
 from diagnosis_cases import recorded, wrong
@@ -50,3 +51,16 @@ def test_searches_that_agree_are_one():
     apart = view._apart(at(cost) for cost in (nan, 9.0, 3.0, 9.2, 3.1, nan))
     assert [one.cost for one in apart[:2]] == [3.0, 9.0]
     assert all(one.cost != one.cost for one in apart[2:])
+
+
+@pytest.mark.parametrize(("costs", "turns"), [((9.0, 5.0, 4.9, 0.0), 2), ((math.nan, math.nan, math.nan), 1)])
+def test_turns_end_where_the_cost_stays_or_there_is_none(monkeypatch, costs, turns):
+    """Claim: numbers and disturbance are sought in turns while the cost falls, and once where it is no number."""
+
+    def at(number):
+        made = object.__new__(view._At)
+        made.__dict__ |= {"cost": costs[number], "number": number}
+        return made
+
+    monkeypatch.setattr(view, "_turned", lambda led, one: at(one.__dict__["number"] + 1))
+    assert view._settled(object.__new__(view._Led), at(0)).__dict__["number"] == turns
