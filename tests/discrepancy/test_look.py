@@ -59,7 +59,7 @@ def test_turns_end_where_the_cost_stays_or_there_is_none(monkeypatch, costs, tur
 
     def at(number):
         made = object.__new__(view._At)
-        made.__dict__ |= {"cost": costs[number], "number": number}
+        made.__dict__.update(cost=costs[number], number=number)
         return made
 
     monkeypatch.setattr(view, "_turned", lambda led, one: at(one.__dict__["number"] + 1))
