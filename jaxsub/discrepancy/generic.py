@@ -159,7 +159,7 @@ class _Weighed:
         return np.array([p.log_evidence(held) + gain(p) for p in self.evidence.products])
 
     def together(self, products: Products) -> tuple[Products, Smooth]:
-        """Products of what was chosen and of the columns of the force's prior, and what hats these are made of."""
+        """Products of what was chosen and of the columns of the force's prior, and the smooth function of these."""
         smooth = smoothest(products, self.held, self.own, self.length)
         return products.mixed(self.held, self.own, smooth.weights), smooth
 
@@ -170,7 +170,7 @@ class _Weighed:
         return with_it > max(float(np.sum(p.predicted(self.held))) for p in products)
 
     def heights(self, at: int) -> tuple[np.ndarray, float, float]:
-        """Of the force, how far from zero before the data, and the share of what all explain that the chosen do."""
+        """Of the force, how far from zero they are before the data, and of what all explain the chosen's share."""
         both, smooth = self.together(self.evidence.products[at])
         gains = both.gains(self.held, [self.own])
         fall = both.fall(self.held)

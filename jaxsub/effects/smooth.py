@@ -46,16 +46,16 @@ class SmoothForce(AbstractForce):
     a_10: Array = amplitude("1")
     a_11: Array = amplitude("1")
 
-    @classmethod
-    def candidates(cls, facts: Facts) -> "Sequence[SmoothForce]":
-        """None: it is not a name for anything."""
-        return []
-
     def __check_init__(self):
         if not self.low < self.high:
             raise InputError(
                 self.label, f"its low {self.low:g} is not below its high {self.high:g}", "mend one of them"
             )
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[SmoothForce]":
+        """None: it is not a name for anything."""
+        return []
 
     @property
     def where(self) -> tuple[str, ...]:
@@ -68,7 +68,7 @@ class SmoothForce(AbstractForce):
 
     def prior_std(self) -> dict[str, float]:
         """The same for all."""
-        return dict.fromkeys((f"a_{j}" for j in range(KNOTS)), self.spread)
+        return dict.fromkeys(self.units(), self.spread)
 
     @property
     def expression(self) -> str:
