@@ -23,8 +23,8 @@ from .verdict import Judged, helped, standing_in
 
 # effects that stand in at a time, sets of them that are fitted, and times that more are asked for
 _AT_ONCE, _TRIES, _TIMES = 4, 5, 3
-# of the squared errors of a free run, the share that each must explain
-_ENOUGH = 0.05
+# of the squared errors of a free run, the share that each must explain on the training runs, and all on the held-out
+_ENOUGH, _LITTLE = 0.05, 0.01
 # times a standard error, to which it may grow beside a description
 _ABOUT = 2.0
 # of how far from zero a force without a name was found to be
@@ -63,11 +63,20 @@ def _with_more(trial: Trial, named: Model, model: Model, selector: Selector) -> 
         if wrong:
             selector.usable[[effect.label in wrong for effect in selector.candidates]] = False
             asked = freest(selector)
-        elif _helpful(luck(model.shown, more.shown, True, freely=True)):
+        elif _worth(model, more):
             return more
         else:
             asked = asked[: len(asked) // 2]
     return None
+
+
+def _worth(model: Model, more: Model) -> bool:
+    """Whether what stands in explains some of the free runs that no fit saw, and the training runs better.
+
+    What hardly changes anything may do so without luck, and would then ask for a round of fits more.
+    """
+    gain = luck(model.shown, more.shown, True, freely=True)
+    return _helpful(gain) and gain.free < 1.0 - _LITTLE and float(more.fit.cost) < float(model.fit.cost)
 
 
 def _helpful(gain: Luck) -> bool:

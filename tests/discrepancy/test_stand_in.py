@@ -58,9 +58,21 @@ def seen(selector, memory, pattern=None, disturbance=None):
     return found
 
 
-@pytest.mark.parametrize(("helps", "left", "stands"), [(True, 1e-9, True), (False, 1e-9, False), (True, 1.0, False)])
-def test_a_description_joins_where_something_is_left_and_free_runs_err_less(monkeypatch, helps, left, stands):
-    """Claim: a drag of the wrong sign goes and the rest stands; not where free runs are worse or nothing is left."""
+@pytest.mark.parametrize(
+    ("chance", "free", "cost", "left", "stands"),
+    [
+        (0.01, 0.98, 0.9, 1e-9, True),
+        (0.5, 0.98, 0.9, 1e-9, False),
+        (0.01, 0.995, 0.9, 1e-9, False),
+        (0.01, 0.98, 1.1, 1e-9, False),
+        (0.01, 0.98, 0.9, 1.0, False),
+    ],
+)
+def test_a_description_joins_where_it_explains_some_of_what_is_left(monkeypatch, chance, free, cost, left, stands):
+    """Claim: a drag of the wrong sign goes, the rest stands; not by luck, for half a per cent, or fitted worse.
+
+    Nor where nothing is left.
+    """
     surge, yaw = QuadraticDamping("surge", -1.0), CubicDamping("yaw", -1.0)
     shares = [(0.3, 0.2), (0.0, 0.2), (0.0, 0.0)]
     runs = batch(wrong(), recorded(None, 2)[:2])
@@ -68,13 +80,14 @@ def test_a_description_joins_where_something_is_left_and_free_runs_err_less(monk
     named = Model(found, look(found), None, ())
     admitted = lambda chosen, index: selector.usable[index]
     selector = Freely([surge, yaw], shares, admitted, named.view.disturbance)
-    fitted = lambda trial, model, effects, disturbance: model._replace(added=(*model.added, *effects))
+    fit_of = dataclasses.replace(found, cost=cost * found.cost)
+    fitted = lambda trial, model, effects, disturbance: model._replace(fit=fit_of, added=(*model.added, *effects))
     monkeypatch.setattr(Trial, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
     again = Freely([], [()], lambda *_: True)
     fakes = {
         "sound": lambda fit, effects: effects[0] is not yaw,
-        "luck": lambda *given, freely: Luck(-1.0, 1.0, 0.5, 0.01 if helps else 0.5, given[2], freely),
+        "luck": lambda *given, freely: Luck(-1.0, 1.0, free, chance, given[2], freely),
         "listed": lambda *_: again,
         "weighed": lambda *_: seen(again, RANDOM),
     }
