@@ -129,11 +129,13 @@ def freest(selector: Selector) -> list[AbstractEffect]:
 def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
     """The model with the force without a name, if what comes next or free runs stand on the held-out runs.
 
-    How far from zero it is was asked of its shape in detail, and its few knots may overdo it: so half of that is tried.
+    How far from zero it is was asked of its shape in detail, and its few knots may overdo it: so half of that is tried,
+    and less where free runs err less with it.
     """
     if found.pattern is None or not found.pattern.joins:
         return base, judged
     force, disturbance = found.pattern.force, found.naming.products.disturbance
+    worst = np.inf
     for share in _SHARES:
         less = dataclasses.replace(force, spread=share * force.spread)
         more = _fitted(trial, named, base, [less], disturbance)
@@ -142,4 +144,7 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
         gain = freely if _helpful(freely) and not gain.helps else gain
         if gain.helps:
             return more, helped(judged, less, gain)
+        if gain.free > worst:
+            break
+        worst = gain.free
     return base, helped(judged, force, gain)

@@ -103,21 +103,40 @@ def test_a_description_joins_where_it_explains_some_of_what_is_left(monkeypatch,
     assert [surge.label in note for note in said.notes] == [True] * stands
 
 
-@pytest.mark.parametrize(("most", "stands"), [(9.0, 8.0), (5.0, 4.0), (1.0, None)])
-def test_a_force_that_overdoes_it_is_tried_by_halves(monkeypatch, most, stands):
-    """Claim: of a force that was found to be 8 N from zero half and a quarter are tried, and the largest that helps."""
+@pytest.mark.parametrize(
+    ("most", "worse", "asked", "stands"),
+    [
+        (9.0, 0.0, [8.0], 8.0),
+        (5.0, 0.0, [8.0, 4.0], 4.0),
+        (1.0, 0.0, [8.0, 4.0, 2.0], None),
+        (3.0, 1.0, [8.0, 4.0], None),
+    ],
+)
+def test_a_force_that_overdoes_it_is_tried_by_halves(monkeypatch, most, worse, asked, stands):
+    """Claim: of a force found to be 8 N from zero half and a quarter are tried, and the largest that helps stands.
+
+    Where free runs err more with half of it a quarter is not tried.
+    """
     force = SmoothForce("surge", "u", -1.0, 1.0, 8.0)
     pattern = Pattern(force, np.zeros(2), 1.0, 1e-9, True, 0.0, 0.0)
     found = fit(wrong(), batch(wrong(), recorded(None, 2)[:2]))
     named = Model(found, look(found), None, ())
-    fitted = lambda trial, model, effects, disturbance: model._replace(shown=effects[0].spread, added=tuple(effects))
+    spreads = []
+
+    def fitted(trial, model, effects, disturbance):
+        spreads.append(effects[0].spread)
+        return model._replace(shown=effects[0].spread, added=tuple(effects))
+
+    def gained(before, after, sound, *, freely):
+        return Luck(1.0, 0.01 if after < most else 1.0, 1.0 + worse / after, 1.0, sound, freely)
+
     monkeypatch.setattr(Trial, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
-    gained = lambda before, after, sound, *, freely: Luck(1.0, 0.01 if after < most else 1.0, 1.0, 1.0, sound, freely)
     monkeypatch.setattr(path, "luck", gained)
     trial = object.__new__(Trial)
     left = seen(Freely([], [()], lambda *_: True), Memory(1e-9, 1.0), pattern, named.view.disturbance)
     best, said = described(trial, named, left, Judged("unknown", [], 1e-9, []), None)
+    assert spreads == asked
     assert [effect.spread for effect in best.added] == ([] if stands is None else [stands])
     assert (best is named) is (stands is None)
     assert [force.label in note for note in said.notes] == [True]
