@@ -51,11 +51,11 @@ class Runs(eqx.Module):
         Every batch that one call of a program makes then has one shape, and is compiled for once.
         """
         index = np.array([*chosen, *[chosen[0]] * (size - len(chosen))])
-        real = jnp.arange(size)[:, None, None] < len(chosen)
         arrays = ("times", "step_of", "live", "signals", "outputs", "mask")
-        taken = {name: getattr(self, name)[index] for name in arrays}
-        taken["mask"] = taken["mask"] & real
-        return dataclasses.replace(self, **taken)
+        # by NumPy, for which no program has to be made
+        taken = {name: np.asarray(getattr(self, name))[index] for name in arrays}
+        taken["mask"] &= np.arange(size)[:, None, None] < len(chosen)
+        return dataclasses.replace(self, **{name: jnp.asarray(array) for name, array in taken.items()})
 
     def segments(self, count: int) -> "Runs":
         """Every run cut into `count` pieces of equal length, each a run of its own that starts where the last ended.
