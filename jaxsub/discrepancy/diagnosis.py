@@ -164,6 +164,11 @@ class Diagnosis:
     history: list[tuple[str, dict[str, float]]] = dataclasses.field(default_factory=list)
     explanations: tuple[AbstractVehicle, ...] = ()
 
+    @property
+    def improves(self) -> bool:
+        """Whether the improved model is another than the baseline: an effect was named, or stands in without a name."""
+        return any(found.get("improved", found["baseline"]) != found["baseline"] for found in self.fit.values())
+
     def to_json(self) -> dict[str, Any]:
         """The contents of `diagnosis.json`."""
         plain = lambda estimate: dataclasses.asdict(estimate)

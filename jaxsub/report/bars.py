@@ -61,7 +61,7 @@ def moved_coefficients(diagnosis: Diagnosis) -> list[tuple[Coefficient, float, f
 
 def draw_coefficients(diagnosis: Diagnosis) -> Picture | None:
     """How far each coefficient moved when the effects were added, or None when nothing was."""
-    moved = moved_coefficients(diagnosis) if diagnosis.physics else []
+    moved = moved_coefficients(diagnosis) if diagnosis.improves else []
     if not moved:
         return None
     figure = new_figure(_WIDTH, 0.24 * len(moved) + 1.1)

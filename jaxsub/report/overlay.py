@@ -28,9 +28,9 @@ _MOST_CHANNELS = 4
 
 
 def affected_channels(diagnosis: Diagnosis, overlay: Overlay) -> list[str]:
-    """The channels of `overlay` that gained most where something was accepted, else those that are worst modelled."""
+    """The channels of `overlay` that gained most by an improved model, else those that are worst modelled."""
     fit = diagnosis.fit.get("held_out", {})
-    baseline, improved = fit.get("baseline", {}), fit.get("improved", {}) if diagnosis.physics else {}
+    baseline, improved = fit.get("baseline", {}), fit.get("improved", {}) if diagnosis.improves else {}
     gain = {name: baseline.get(name, 0.0) - improved.get(name, 0.0) for name in overlay.measured}
     return sorted(gain, key=lambda name: -gain[name])[:_MOST_CHANNELS]
 
@@ -53,7 +53,7 @@ def draw_overlay(diagnosis: Diagnosis) -> Picture | None:
     names = affected_channels(diagnosis, overlay)
     alt = f"Measured and modelled {', '.join(names)} in run {overlay.run}, and what remains over its noise"
     quality = {channel.channel: channel for channel in diagnosis.channels}
-    improved = bool(diagnosis.physics)
+    improved = diagnosis.improves
     wide, narrow = (_render(overlay, names, quality, improved, page) for page in (WIDE, NARROW))
     return Picture("before-after", alt, wide, narrow)
 
@@ -105,7 +105,7 @@ def _legend(improved: bool) -> list[Line2D]:
     handles = [dots, Line2D([], [], color=BASELINE, label="baseline model")]
     if improved:
         handles.append(Line2D([], [], color=IMPROVED, label="improved model"))
-    return [*handles, Line2D([], [], color=PALE, linewidth=6, label="±2σ of the sensor")]
+    return [*handles, Line2D([], [], color=PALE, linewidth=6, label="±2σ")]
 
 
 def _rms(values: np.ndarray) -> float:

@@ -42,7 +42,7 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
         "diagnosis": diagnosis,
         "verdict": _VERDICTS[diagnosis.verdict],
         "pictures": pictures,
-        "effects": tables.effects_text(vehicle_text) if diagnosis.physics else "",
+        "effects": tables.effects_text(vehicle_text) if diagnosis.improves else "",
         "key_numbers": _key_numbers(diagnosis),
         "force_run": telling_trace(diagnosis),
         "overlay": telling_overlay(diagnosis),

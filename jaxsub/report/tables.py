@@ -7,7 +7,7 @@ import math
 import tomlkit
 
 from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location
-from .text import number, ratio, symbol
+from .text import number, ratio, symbol, unit
 
 _MOST_INTERVALS = 6  # of one run; more are counted
 _SAME_SIGMA = 1.5  # factor by which stated and recorded noise may differ unremarked
@@ -26,9 +26,13 @@ class KeyNumber:
 
 @dataclasses.dataclass(frozen=True)
 class FitCell:
-    """rms(residual)/σ as text and the tone that says how far it is from the noise floor."""
+    """rms(residual)/σ and the rms itself as text, and the tone that says how far it is from the noise floor.
+
+    Where no noise is stated σ is what the baseline left, which is no floor, and there is no tone.
+    """
 
     text: str
+    size: str
     tone: str
 
 
@@ -50,8 +54,8 @@ class ChannelRow:
 
 
 def fit_columns(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """The (set, model) pairs that are worth showing: no improved model where nothing was accepted."""
-    models = ["baseline", "improved"] if diagnosis.physics else ["baseline"]
+    """The (set, model) pairs that are worth showing: no improved model where there is none."""
+    models = ["baseline", "improved"] if diagnosis.improves else ["baseline"]
     pairs = itertools.product(("train", "held_out"), models)
     return [(runs, model) for runs, model in pairs if diagnosis.fit.get(runs, {}).get(model)]
 
@@ -60,7 +64,9 @@ def fit_rows(diagnosis: Diagnosis) -> list[FitRow]:
     """One row for each channel that any column has."""
     columns = [diagnosis.fit[runs][model] for runs, model in fit_columns(diagnosis)]
     channels = dict.fromkeys(channel for column in columns for channel in column)
-    return [FitRow(channel, [_fit_cell(column.get(channel)) for column in columns]) for channel in channels]
+    known = {quality.channel: quality for quality in diagnosis.channels}
+    cells = lambda channel: [_fit_cell(column.get(channel), known.get(channel)) for column in columns]
+    return [FitRow(channel, cells(channel)) for channel in channels]
 
 
 def channel_rows(diagnosis: Diagnosis) -> list[ChannelRow]:
@@ -73,22 +79,29 @@ def channel_rows(diagnosis: Diagnosis) -> list[ChannelRow]:
 
 
 def gain_number(diagnosis: Diagnosis) -> KeyNumber | None:
-    """The unseen channel that gained most, or without an improved model the one that is worst; None without any."""
+    """The unseen channel that gained most, or without an improved model the one that is worst; None without any.
+
+    Over the noise that is stated for it, or in its unit where none is.
+    """
     fit = diagnosis.fit.get("held_out", {})
-    before, after = fit.get("baseline", {}), fit.get("improved", {}) if diagnosis.physics else {}
+    before, after = fit.get("baseline", {}), fit.get("improved", {}) if diagnosis.improves else {}
     both = [channel for channel in before if channel in after]
+    if not before:
+        return None
     if both:
-        best = max(both, key=lambda channel: before[channel] / max(after[channel], 1e-9))
-        value = f"{ratio(before[best])} → {ratio(after[best])}"
-        return KeyNumber(
-            value, f"residual/σ of {symbol(best)}, unseen runs", "most improved channel; 1 is the noise floor"
+        chosen, which = (
+            max(both, key=lambda channel: before[channel] / max(after[channel], 1e-9)),
+            "most improved channel",
         )
-    if before:
-        worst = max(before, key=lambda channel: before[channel])
-        return KeyNumber(
-            ratio(before[worst]), f"residual/σ of {symbol(worst)}, unseen runs", "worst channel; 1 is the noise floor"
-        )
-    return None
+    else:
+        chosen, which = max(before, key=lambda channel: before[channel]), "worst channel"
+    values = [models[chosen] for models in (before, after) if chosen in models]
+    quality = next((quality for quality in diagnosis.channels if quality.channel == chosen), None)
+    if quality is None or not quality.sigma_estimated:
+        value = " → ".join(ratio(value) for value in values)
+        return KeyNumber(value, f"residual/σ of {symbol(chosen)}, unseen runs", f"{which}; 1 is the noise floor")
+    value = " → ".join(number(value * quality.sigma, 3) for value in values)
+    return KeyNumber(f"{value} {unit(quality.unit)}".rstrip(), f"rms error of {symbol(chosen)}, unseen runs", which)
 
 
 def run_number(diagnosis: Diagnosis) -> KeyNumber:
@@ -104,7 +117,7 @@ def intervals(place: Location) -> list[str]:
     """`dive-2: 12–31.5 s, 40–44 s` for each run in which the mismatch is significant."""
     lines = []
     for run in dict.fromkeys(run for run, _, _ in place.times):
-        own = [f"{_seconds(start)}–{_seconds(end)}" for name, start, end in place.times if name == run]
+        own = [_interval(start, end) for name, start, end in place.times if name == run]
         more = f" and {len(own) - _MOST_INTERVALS} more" if len(own) > _MOST_INTERVALS else ""
         lines.append(f"{run}: {', '.join(own[:_MOST_INTERVALS])} s{more}")
     return lines
@@ -116,11 +129,14 @@ def effects_text(vehicle_text: str) -> str:
     return tomlkit.dumps({"effects": effects}).strip() if effects else ""
 
 
-def _seconds(time: float) -> str:
-    return number(round(time, 1), 9)
+def _interval(start: float, end: float) -> str:
+    first, last = (number(round(time, 1), 9) for time in (start, end))
+    return first if first == last else f"{first}–{last}"
 
 
-def _fit_cell(value: float | None) -> FitCell:
+def _fit_cell(value: float | None, quality: ChannelQuality | None) -> FitCell:
     if value is None or math.isnan(value):
-        return FitCell(ratio(value), "")
-    return FitCell(ratio(value), next(tone for limit, tone in _TONES if value <= limit))
+        return FitCell(ratio(value), "", "")
+    size = f"{number(value * quality.sigma, 3)} {unit(quality.unit)}".rstrip() if quality else ""
+    no_floor = quality is not None and quality.sigma_estimated
+    return FitCell(ratio(value), size, "" if no_floor else next(tone for limit, tone in _TONES if value <= limit))

@@ -13,12 +13,27 @@ def test_fit_table_has_a_column_for_each_model_there_is():
     both = [("train", "baseline"), ("train", "improved"), ("held_out", "baseline"), ("held_out", "improved")]
     assert tables.fit_columns(diagnosis("named")) == both
     assert tables.fit_columns(diagnosis("unknown")) == both[::2]
+    assert tables.fit_columns(diagnosis("unknown", described=True)) == both
     assert tables.fit_columns(bare()) == []
     rows = {row.channel: row.cells for row in tables.fit_rows(diagnosis("named"))}
     assert [(cell.text, cell.tone) for cell in rows["v"]] == [
         ("14.3", "far"), ("1.08", "floor"), ("15.4", "far"), ("1.10", "floor")
     ]  # fmt: skip
     assert [cell.tone for cell in rows["phi"]] == ["off", "floor", "off", "floor"]
+
+
+def test_a_channel_without_a_stated_noise_is_told_in_its_unit_and_has_no_floor():
+    """Claim: w, whose σ is what the baseline left, has rms errors in m/s and no tone; v has both."""
+    made = diagnosis("named")
+    sigma = {quality.channel: quality.sigma for quality in made.channels}
+    rows = {row.channel: row.cells for row in tables.fit_rows(made)}
+    assert {cell.tone for cell in rows["w"]} == {""}
+    assert rows["v"][0].size == f"{made.fit['train']['baseline']['v'] * sigma['v']:.3g} m/s"
+    alone = {"baseline": {"w": 7.0}, "improved": {"w": 0.5}}
+    only = dataclasses.replace(made, fit={"train": alone, "held_out": alone})
+    found = tables.gain_number(only)
+    assert found.value == f"{7.0 * sigma['w']:.3g} → {0.5 * sigma['w']:.3g} m/s"
+    assert "σ" not in found.label and "floor" not in found.detail
 
 
 def test_channel_in_one_column_only_has_a_dash_in_the_others():
@@ -38,14 +53,15 @@ def test_noise_that_is_not_as_stated_is_flagged_both_ways():
 def test_key_numbers():
     assert tables.gain_number(diagnosis("named")).value == "15.4 → 1.10"
     assert tables.gain_number(diagnosis("unknown")).value == "15.4"
+    assert tables.gain_number(diagnosis("unknown", described=True)).value == "15.4 → 1.10"
     assert tables.gain_number(bare()) is None
     assert tables.run_number(diagnosis("none")).detail.startswith("2 fitted, 1 held out")
 
 
 def test_intervals_are_told_by_run_and_counted_when_many():
     many = [("b", float(start), start + 0.25) for start in range(9)]
-    lines = tables.intervals(Location("yaw", 1.0, [("a", 1.0, 1234.56), *many], []))
-    assert lines[0] == "a: 1–1234.6 s"
+    lines = tables.intervals(Location("yaw", 1.0, [("a", 1.0, 1234.56), ("a", 2000.0, 2000.04), *many], []))
+    assert lines[0] == "a: 1–1234.6, 2000 s"
     assert lines[1].startswith("b: 0–0.2, 1–1.2,") and lines[1].endswith("5–5.2 s and 3 more")
 
 
