@@ -14,6 +14,7 @@ from ..discrepancy import batch
 from ..errors import InputError
 from ..estimate import METHODS, Fit, fit, posterior
 from ..identifiability import Coloured, Identifiability, Verdict, coloured_covariance, identifiability
+from ..report.text import unit
 from ..results import RESULTS
 from ..vehicle import read_vehicle, write_vehicle
 from . import session
@@ -77,7 +78,7 @@ def _write(found: Fit, said: Identifiability, coloured: Coloured, method: str, f
             "verdicts": [_plain(verdict) for verdict in said.verdicts],
         },
         "coefficients": {
-            n: {"value": v, "standard_error": white[n], "standard_error_coloured": wide[n]}
+            n: {"value": v, "standard_error": white[n], "standard_error_coloured": wide[n], "unit": units[n]}
             for n, v in found.values.items()
         },
     }
@@ -93,11 +94,13 @@ def _plain(verdict: Verdict) -> dict:
 def _show(found: Fit, said: Identifiability, coloured: Coloured) -> None:
     for sentence in said.sentences():
         session.console.print(sentence, highlight=False, markup=False)
-    table = Table("coefficient", "value", "standard error", "if residuals are coloured", "the recordings")
+    table = Table("coefficient", "value", "standard error", "if residuals are coloured", "unit", "the recordings")
     white, wide = found.standard_errors, coloured.standard_errors
     kind = {verdict.name: verdict.kind for verdict in said.verdicts}
+    units = {row.name: unit(row.unit) for row in found.vehicle.layout.free}
     for name, value in found.values.items():
-        table.add_row(escape(name), f"{value:.6g}", f"{white[name]:.2g}", f"{wide[name]:.2g}", kind[name])
+        errors = (f"{errors[name]:.2g}" for errors in (white, wide))
+        table.add_row(escape(name), f"{value:.6g}", *errors, escape(units[name]), kind[name])
     session.console.print(table)
     if not bool(found.result == RESULTS.successful):
         away = f"{float(found.gradient_norm):.2g} standard errors from the optimum"
