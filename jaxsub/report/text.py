@@ -92,7 +92,11 @@ def unit(text: str) -> str:
 
 
 def formula(text: str) -> Markup:
-    """A formula as HTML: true minus signs, bars for `abs`, Greek letters by name, subscripts after an underscore."""
+    """A formula as HTML: true minus signs, bars for `abs`, Greek letters by name, subscripts after an underscore.
+
+    Factors stand side by side.
+    """
+    text = re.sub(r"(?<!\*)\*(?!\*)", " ", text)
     text = re.sub(r"\babs\(([^()]*)\)", r"|\1|", text)
     text = re.sub(r"-(?![A-Za-z])|(?<![A-Za-z])-", MINUS, text)
     pieces = re.split(r"([^\W\d_]\w*)", text)

@@ -102,4 +102,5 @@ def test_symbols_units_and_formulas_are_set():
         "m s⁻²",
     ]
     assert formula("-C_d abs(v) v - T d(delta_r)/dt") == "−C<sub>d</sub> |v| v − T d(δ<sub>r</sub>)/dt"
+    assert formula("v*abs(v)") == "v |v|"
     assert formula("Y_vdot < quadratic-damping") == "Y<sub>v̇</sub> &lt; quadratic-damping"
