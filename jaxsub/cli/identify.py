@@ -99,8 +99,8 @@ def _show(found: Fit, said: Identifiability, coloured: Coloured) -> None:
     kind = {verdict.name: verdict.kind for verdict in said.verdicts}
     units = {row.name: unit(row.unit) for row in found.vehicle.layout.free}
     for name, value in found.values.items():
-        errors = (f"{errors[name]:.2g}" for errors in (white, wide))
-        table.add_row(escape(name), f"{value:.6g}", *errors, escape(units[name]), kind[name])
+        spread = (f"{errors[name]:.2g}" for errors in (white, wide))
+        table.add_row(escape(name), f"{value:.6g}", *spread, escape(units[name]), kind[name])
     session.console.print(table)
     if not bool(found.result == RESULTS.successful):
         away = f"{float(found.gradient_norm):.2g} standard errors from the optimum"

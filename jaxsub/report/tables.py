@@ -88,13 +88,9 @@ def gain_number(diagnosis: Diagnosis) -> KeyNumber | None:
     both = [channel for channel in before if channel in after]
     if not before:
         return None
-    if both:
-        chosen, which = (
-            max(both, key=lambda channel: before[channel] / max(after[channel], 1e-9)),
-            "most improved channel",
-        )
-    else:
-        chosen, which = max(before, key=lambda channel: before[channel]), "worst channel"
+    gain = lambda channel: before[channel] / max(after[channel], 1e-9)
+    chosen = max(both, key=gain) if both else max(before, key=lambda channel: before[channel])
+    which = "most improved channel" if both else "worst channel"
     values = [models[chosen] for models in (before, after) if chosen in models]
     quality = next((quality for quality in diagnosis.channels if quality.channel == chosen), None)
     if quality is None or not quality.sigma_estimated:
