@@ -1,5 +1,6 @@
 """The whole path: fit, locate, name, model, show."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .advice import next_manoeuvre
 from .batch import batch
-from .diagnosis import Diagnosis, Location, Physics, Rival
+from .diagnosis import Candidate, Diagnosis, Location, Physics, Rival
 from .explain import examine, explained
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
@@ -96,7 +97,7 @@ def _told(
             "train": {"baseline": start.rms, "improved": improved.rms},
             "held_out": {"baseline": before.rms, "improved": after.rms},
         },
-        candidates=first.naming.candidates,
+        candidates=_became(first.naming.candidates, physics, standing),
         forces=field.traces,
         remaining_forces=traces(best.view, train) if best.added else field.traces,
         overlays=overlays(held, layout.channels, before, after),
@@ -123,6 +124,16 @@ def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording
         share = {place: 0.5 * part for place, part in share.items()}
         share[found.nameless] = share.get(found.nameless, 0.0) + 0.5
     return locations(field, view, train, share)
+
+
+def _became(
+    candidates: Sequence[Candidate], physics: Sequence[Physics], standing: Sequence[AbstractEffect]
+) -> list[Candidate]:
+    """The candidates of the first look with what became in the end of those that stand and of their rivals."""
+    became = {rival.label: "rival" for found in physics for rival in found.rivals}
+    became |= {effect.label: "stands in, its cause unclaimed" for effect in standing}
+    became |= {found.label: "accepted" for found in physics}
+    return [dataclasses.replace(one, outcome=became.get(one.label, one.outcome)) for one in candidates]
 
 
 def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVehicle, ...]:

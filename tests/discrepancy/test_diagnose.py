@@ -70,6 +70,9 @@ def test_names_locates_and_improves(effect):
     before, after = (found.fit["held_out"][key] for key in ("baseline", "improved"))
     assert max(before.values()) > 1.2
     assert max(after.values()) < 1.15
+    outcomes = {candidate.label: candidate.outcome for candidate in found.candidates}
+    assert outcomes[physics.label] == "accepted"
+    assert {outcomes[rival.label] for rival in physics.rivals if rival.label in outcomes} <= {"rival"}
     content = json.loads(json.dumps(found.to_json()))
     assert content["schema"] == 1 and content["physics"][0]["effect"] == effect.name
 
