@@ -9,7 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..effects import CHANNEL_UNITS
 from ..estimate import Fit, channel_rms, initial_guess, output_errors, predict, search
 from ..likelihood import Disturbance, Followed, follow, whitened
 from ..recording import Recording
@@ -175,7 +174,7 @@ def channel_quality(fit: Fit) -> list[ChannelQuality]:
     rows = []
     for i, output in enumerate(fit.vehicle.layout.outputs):
         samples = int(mask[..., i].sum())
-        unit = CHANNEL_UNITS.get(output.channel, "")
+        unit = fit.vehicle.layout.unit(output.channel)
         missing = 1.0 - samples / live.sum()
         sigma = float(fit.sigma[i])
         rows.append(

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..effects import (
+    CHANNEL_UNITS,
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
@@ -81,6 +82,10 @@ class Layout:
     def free(self) -> list[Parameter]:
         """The parameters that an estimator may move."""
         return [parameter for parameter in self.parameters if parameter.free]
+
+    def unit(self, name: str) -> str:
+        """The SI unit of a body's channel or state; nothing for a mechanism's, whose `q` may be in metres or volts."""
+        return CHANNEL_UNITS.get(name, "") if self.kind == "submerged-body" else ""
 
 
 class AbstractVehicle(eqx.Module):

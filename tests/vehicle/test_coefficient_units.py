@@ -2,6 +2,7 @@
 
 import pint
 import pytest
+from rigs import oscillator
 
 from jaxsub.vehicle.catalogue import nps_auv_ii, remus_100
 from jaxsub.vehicle.coefficient_units import coefficient_unit
@@ -29,3 +30,9 @@ def test_what_is_no_symbol_has_no_unit():
     assert coefficient_unit("buoyancy") == "N"
     assert coefficient_unit("X_nn") == "N/(rad/s)/(rad/s)"
     assert coefficient_unit("Y_vdotdot") == coefficient_unit("D_q") == ""
+
+
+def test_a_mechanism_has_no_units_of_a_body():
+    """Claim: `q` is a pitch rate of a body, and of a mechanism a coordinate of whatever unit."""
+    assert nps_auv_ii().layout.unit("q") == "rad/s"
+    assert oscillator().layout.unit("q") == ""
