@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from ..discrepancy import batch
 from ..errors import InputError
@@ -94,7 +94,8 @@ def _plain(verdict: Verdict) -> dict:
 def _show(found: Fit, said: Identifiability, coloured: Coloured) -> None:
     for sentence in said.sentences():
         session.console.print(sentence, highlight=False, markup=False)
-    table = Table("coefficient", "value", "standard error", "if residuals are coloured", "unit", "the recordings")
+    error = Column("standard error", no_wrap=True)
+    table = Table("coefficient", "value", error, "if residuals are coloured", "unit", "the recordings")
     white, wide = found.standard_errors, coloured.standard_errors
     kind = {verdict.name: verdict.kind for verdict in said.verdicts}
     units = {row.name: unit(row.unit) for row in found.vehicle.layout.free}

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import VELOCITIES, AbstractActuator, AbstractEffect, AbstractInstrument, AbstractSensor
+from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, AbstractSensor
 from ..errors import InputError, require_known
 from ..filter.model import linearised
 from ..simulate import Sampled, step_table
@@ -60,10 +60,7 @@ class Plant(eqx.Module):
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the states: velocities, positions, then memories."""
-        layout = self.vehicle.layout
-        body = layout.kind == "submerged-body"
-        rates = [VELOCITIES[e] if body else f"{e}_rate" for e in layout.equations]
-        return (*rates, *layout.positions, *_memory_names(self.vehicle.effects, self.sizes))
+        return (*self.vehicle.layout.states, *_memory_names(self.vehicle.effects, self.sizes))
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -167,7 +167,12 @@ class Diagnosis:
     @property
     def improves(self) -> bool:
         """Whether the improved model is another than the baseline: an effect was named, or stands in without a name."""
-        return any(found.get("improved", found["baseline"]) != found["baseline"] for found in self.fit.values())
+        return len(self.history) > 1
+
+    @property
+    def quality(self) -> dict[str, ChannelQuality]:
+        """What is known of each channel's noise, by the channel."""
+        return {quality.channel: quality for quality in self.channels}
 
     def to_json(self) -> dict[str, Any]:
         """The contents of `diagnosis.json`."""

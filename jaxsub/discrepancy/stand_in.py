@@ -135,7 +135,7 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
     if found.pattern is None or not found.pattern.joins:
         return base, judged
     force, disturbance = found.pattern.force, found.naming.products.disturbance
-    worst = np.inf
+    last = np.inf
     for share in _SHARES:
         less = dataclasses.replace(force, spread=share * force.spread)
         more = _fitted(trial, named, base, [less], disturbance)
@@ -144,7 +144,7 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
         gain = freely if _helpful(freely) and not gain.helps else gain
         if gain.helps:
             return more, helped(judged, less, gain)
-        if gain.free > worst:
+        if gain.free > last:
             break
-        worst = gain.free
+        last = gain.free
     return base, helped(judged, force, gain)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..effects import CHANNEL_UNITS, VELOCITIES
+from ..effects import CHANNEL_UNITS
 from ..likelihood import errors
 from ..likelihood.march import March
 from ..parameters import Transform
@@ -208,8 +208,7 @@ def _prior(problem: Problem, y: Array) -> Float[Array, " d"]:
 def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r s"], Float[Array, " s"]]:
     """Initial states from the first measured sample of each state's channel, else rest at the operating speed."""
     layout = vehicle.layout
-    body = layout.kind == "submerged-body"
-    names = [VELOCITIES[e] if body else f"{e}_rate" for e in layout.equations] + list(layout.positions)
+    body, names = layout.kind == "submerged-body", layout.states
     aliases = {"z": ("z", "depth")}
     mask, outputs = np.asarray(runs.mask), np.asarray(runs.outputs)
     guess = np.zeros((runs.times.shape[0], len(names)))

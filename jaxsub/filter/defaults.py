@@ -5,7 +5,7 @@ from collections.abc import Callable
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import CHANNEL_UNITS, VELOCITIES
+from ..effects import CHANNEL_UNITS
 from ..vehicle import AbstractVehicle
 from .ekf import AbstractFilter
 from .mekf import ModifiedKalmanFilter
@@ -24,15 +24,13 @@ _PARTNERS = dict(zip("uvwpqr", ("x", "y", "z", "phi", "theta", "psi"), strict=Tr
 def state_scale(vehicle: AbstractVehicle, sigma: Float[Array, " c"]) -> Float[Array, " s"]:
     """For each state the noise of its channel, SI; else that of its rate or its integral over a second; else usual."""
     layout = vehicle.layout
-    body = layout.kind == "submerged-body"
     known = dict(zip(layout.channels, sigma, strict=True))
     if "depth" in known:
         known.setdefault("z", known["depth"])
-    rates = [VELOCITIES[e] if body else f"{e}_rate" for e in layout.equations]
-    partner = _PARTNERS if body else {f"{e}_rate": e for e in layout.equations}
+    partner = _PARTNERS if layout.kind == "submerged-body" else {f"{e}_rate": e for e in layout.equations}
     partner = partner | {position: rate for rate, position in partner.items()}
     usual = lambda name: jnp.asarray(_USUAL.get(CHANNEL_UNITS.get(name, ""), 1.0))
-    return jnp.stack([known.get(n, known.get(partner.get(n, ""), usual(n))) for n in (*rates, *layout.positions)])
+    return jnp.stack([known.get(n, known.get(partner.get(n, ""), usual(n))) for n in layout.states])
 
 
 def vehicle_filter(

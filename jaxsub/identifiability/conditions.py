@@ -12,7 +12,6 @@ from ..errors import InputError
 from ..simulate.synthetic import at_rest
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import stack
-from .naming import state_names
 
 _POINTS, _INTERVAL, _INPUT, _NEWTON = 80, 0.25, 0.2, 20
 # far from rest, but not so far that angles wrap; the conditions hold at every state or at none
@@ -69,8 +68,8 @@ class Conditions(eqx.Module):
     def of(cls, vehicle: AbstractVehicle) -> "Conditions":
         """The conditions for `vehicle`, every unknown scaled so that one of it matters as much as one of another."""
         rng, layout = np.random.default_rng(0), vehicle.layout
-        names, units = zip(*state_names(vehicle).items(), strict=True)
-        scale = np.array([_SCALE.get(unit, 1.0) for unit in units])
+        names = layout.states
+        scale = np.array([_SCALE.get(layout.unit(name), 1.0) for name in names])
         states = np.asarray(at_rest(vehicle, 1)) + scale * rng.standard_normal((_POINTS, len(names)))
         columns = [*layout.inputs, *layout.prescribed, *layout.environment]
         centre, width = np.array([_SURROUNDINGS.get(name, (0.0, _INPUT)) for name, _ in columns]).reshape(-1, 2).T

@@ -29,7 +29,6 @@ from jaxtyping import Array, Float
 from ..simulate.synthetic import at_rest
 from ..vehicle import AbstractVehicle
 from .conditions import Change, Conditions, Equivalent
-from .naming import state_names
 
 # entries of a null vector below this, in their units, are rounding
 _ZERO = 1e-6
@@ -90,7 +89,7 @@ def equivalent_systems(vehicle: AbstractVehicle) -> list[Family]:
 def _families(conditions: Conditions, null: np.ndarray) -> list[Family]:
     """The null space as families, each led by an entry that no other has."""
     vehicle = conditions.vehicle
-    states, equations = tuple(state_names(vehicle)), vehicle.layout.equations
+    states, equations = vehicle.layout.states, vehicle.layout.equations
     names = [row.name for row in vehicle.layout.free]
     p, s, n = len(names), len(states), len(equations)
     labels = names + [f"{'P' if i < n else 'Q'}[{states[i]},{states[j]}]" for i in range(s) for j in range(s)]

@@ -10,7 +10,6 @@ from jaxtyping import Array, Float
 
 from ..estimate import Fit
 from ..vehicle import AbstractVehicle
-from .naming import state_names
 
 # an entry below this part of its row's largest is rounding, and a fin with less of the moment is no way to excite it
 _ZERO, _SHARE = 1e-9, 0.3
@@ -37,7 +36,7 @@ class Excitation:
     def of(cls, fit: Fit) -> "Excitation":
         """The excitation of a fit's recordings."""
         vehicle, layout = fit.vehicle, fit.vehicle.layout
-        states = list(state_names(vehicle))
+        states = list(layout.states)
         n = len(layout.equations)
         inputs = [name for name, _ in (*layout.inputs, *layout.prescribed, *layout.environment)]
         at = jnp.concatenate([fit.model.states, fit.runs.signals], -1).reshape(-1, len(states) + len(inputs))

@@ -37,10 +37,10 @@ def affected_channels(diagnosis: Diagnosis, overlay: Overlay) -> list[str]:
 
 def telling_overlay(diagnosis: Diagnosis) -> Overlay | None:
     """The run in which the baseline misses most."""
-    sigma = {channel.channel: channel.sigma for channel in diagnosis.channels}
+    sigma = lambda channel: diagnosis.quality[channel].sigma if channel in diagnosis.quality else 1.0
 
     def miss(overlay: Overlay) -> float:
-        return max(_rms((overlay.measured[c] - overlay.baseline[c]) / sigma.get(c, 1.0)) for c in overlay.measured)
+        return max(_rms((overlay.measured[c] - overlay.baseline[c]) / sigma(c)) for c in overlay.measured)
 
     return max((overlay for overlay in diagnosis.overlays if overlay.measured), key=miss, default=None)
 
@@ -52,9 +52,8 @@ def draw_overlay(diagnosis: Diagnosis) -> Picture | None:
         return None
     names = affected_channels(diagnosis, overlay)
     alt = f"Measured and modelled {', '.join(names)} in run {overlay.run}, and what remains over its noise"
-    quality = {channel.channel: channel for channel in diagnosis.channels}
     improved = diagnosis.improves
-    wide, narrow = (_render(overlay, names, quality, improved, page) for page in (WIDE, NARROW))
+    wide, narrow = (_render(overlay, names, diagnosis.quality, improved, page) for page in (WIDE, NARROW))
     return Picture("before-after", alt, wide, narrow)
 
 

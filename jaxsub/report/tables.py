@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 
 import tomlkit
 
@@ -64,8 +65,8 @@ def fit_rows(diagnosis: Diagnosis) -> list[FitRow]:
     """One row for each channel that any column has."""
     columns = [diagnosis.fit[runs][model] for runs, model in fit_columns(diagnosis)]
     channels = dict.fromkeys(channel for column in columns for channel in column)
-    known = {quality.channel: quality for quality in diagnosis.channels}
-    cells = lambda channel: [_fit_cell(column.get(channel), known.get(channel)) for column in columns]
+    quality = diagnosis.quality
+    cells = lambda channel: [_fit_cell(column.get(channel), quality.get(channel)) for column in columns]
     return [FitRow(channel, cells(channel)) for channel in channels]
 
 
@@ -92,12 +93,11 @@ def gain_number(diagnosis: Diagnosis) -> KeyNumber | None:
     chosen = max(both, key=gain) if both else max(before, key=lambda channel: before[channel])
     which = "most improved channel" if both else "worst channel"
     values = [models[chosen] for models in (before, after) if chosen in models]
-    quality = next((quality for quality in diagnosis.channels if quality.channel == chosen), None)
+    quality = diagnosis.quality.get(chosen)
     if quality is None or not quality.sigma_estimated:
         value = " → ".join(ratio(value) for value in values)
         return KeyNumber(value, f"residual/σ of {symbol(chosen)}, unseen runs", f"{which}; 1 is the noise floor")
-    value = " → ".join(number(value * quality.sigma, 3) for value in values)
-    return KeyNumber(f"{value} {unit(quality.unit)}".rstrip(), f"rms error of {symbol(chosen)}, unseen runs", which)
+    return KeyNumber(_size(values, quality), f"rms error of {symbol(chosen)}, unseen runs", which)
 
 
 def run_number(diagnosis: Diagnosis) -> KeyNumber:
@@ -125,6 +125,11 @@ def effects_text(vehicle_text: str) -> str:
     return tomlkit.dumps({"effects": effects}).strip() if effects else ""
 
 
+def _size(values: Sequence[float], quality: ChannelQuality) -> str:
+    """Multiples of a channel's σ in its unit, where it has one: `0.21 → 0.034 m/s`."""
+    return f"{' → '.join(number(value * quality.sigma, 3) for value in values)} {unit(quality.unit)}".rstrip()
+
+
 def _interval(start: float, end: float) -> str:
     first, last = (number(round(time, 1), 9) for time in (start, end))
     return first if first == last else f"{first}–{last}"
@@ -133,6 +138,6 @@ def _interval(start: float, end: float) -> str:
 def _fit_cell(value: float | None, quality: ChannelQuality | None) -> FitCell:
     if value is None or math.isnan(value):
         return FitCell(ratio(value), "", "")
-    size = f"{number(value * quality.sigma, 3)} {unit(quality.unit)}".rstrip() if quality else ""
+    size = _size([value], quality) if quality else ""
     no_floor = quality is not None and quality.sigma_estimated
     return FitCell(ratio(value), size, "" if no_floor else next(tone for limit, tone in _TONES if value <= limit))

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from ..effects import (
     CHANNEL_UNITS,
+    VELOCITIES,
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
@@ -77,6 +78,12 @@ class Layout:
     def channels(self) -> tuple[str, ...]:
         """The measured channels."""
         return tuple(output.channel for output in self.outputs)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states: velocities of the free equations (`v` of a body, `x_rate` of a mechanism), positions."""
+        body = self.kind == "submerged-body"
+        return (*(VELOCITIES[e] if body else f"{e}_rate" for e in self.equations), *self.positions)
 
     @property
     def free(self) -> list[Parameter]:

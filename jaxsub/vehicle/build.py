@@ -1,7 +1,7 @@
 """Putting a vehicle together from named numbers."""
 
+import dataclasses
 import math
-import re
 
 import jax.numpy as jnp
 
@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..parameters import Parameter, number
 from .base import Layout, Output, memory_states
 from .checks import check_coefficients, check_effects, check_names, check_outputs, require_inertia
+from .coefficient_units import ADDED, CONTROL, DAMPING, coefficient_unit
 from .control import Control
 from .damping import Damping
 from .inertia import RIGID, Inertia
@@ -22,10 +23,6 @@ BODY_KEYS = (
     "mass", "weight", "buoyancy", "inertia", "centre_of_buoyancy", "speed", "length", "diameter", "reference_density"
 )  # fmt: skip
 VECTORS = {"inertia": ("I_x", "I_y", "I_z"), "centre_of_buoyancy": ("x_B", "y_B", "z_B")}
-
-_ADDED = re.compile(r"^[XYZKMN]_[uvwpqr]dot$")
-_DAMPING = re.compile(r"^[XYZKMN]_[uvwpqr]$")
-_CONTROL = re.compile(r"^[XYZKMN]_(0|nn|delta_(r|er|el|e|s))$")
 
 Numbers = dict[str, tuple[float, Parameter]]
 Pairs = tuple[tuple[str, str], ...]
@@ -57,11 +54,13 @@ def build(
     not positive definite, with the coefficients that make it so.
     """
     hull = dict(hull or {})
-    rows = tuple(row for _, row in numbers.values()) + effect_rows
+    rows = tuple(row for _, row in numbers.values())
     values = {key: number(value) for key, (value, _) in numbers.items()}
     if kind == "submerged-body":
         values = _complete(values, where)
         hull = _sizes(values, hull)
+        rows = tuple(dataclasses.replace(row, unit=coefficient_unit(row.name)) for row in rows)
+    rows += effect_rows
     equations = dof or EQUATIONS
     shown = tuple(output.channel for output in outputs)
     positions = _positions(equations, dict(prescribed), shown) if kind == "submerged-body" else equations
@@ -114,7 +113,7 @@ def _body(values: dict, layout: Layout, effects: tuple, density: float, where: s
     check_names(layout, where)
     body = {"mass", "weight", "buoyancy", "speed", *RIGID, "x_B", "y_B", "z_B"}
     taken = lambda pattern: {n: v for n, v in values.items() if n not in body and pattern.match(n)}
-    added, damping, control = taken(_ADDED), taken(_DAMPING), taken(_CONTROL)
+    added, damping, control = taken(ADDED), taken(DAMPING), taken(CONTROL)
     known = body | set(added) | set(damping) | set(control)
     check_coefficients(values, known, layout, where, control)
     rigid = {name: values[name] for name in ("mass", "I_x", "I_y", "I_z")}

@@ -11,7 +11,6 @@ from ..effects import EQUATIONS, AbstractEffect, SmoothForce, number_fields, opt
 from ..errors import InputError
 from ..parameters import Parameter
 from .build import BODY_KEYS, VECTORS, build
-from .coefficient_units import coefficient_unit
 from .mechanism import Mechanism
 from .schema import Table, read_number, read_option, read_outputs, read_pairs, unknown_key
 from .submerged_body import SubmergedBody
@@ -62,8 +61,7 @@ def vehicle_from(
         top.required("dof")
     numbers = dict(body)
     for name, entry in top.table("coefficients").items():
-        unit = coefficient_unit(name) if kind == "submerged-body" else ""
-        numbers[name] = read_number(name, entry, f"{where}: coefficients.{name}", free=True, unit=unit)
+        numbers[name] = read_number(name, entry, f"{where}: coefficients.{name}", free=True)
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
     built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
     return build(
@@ -93,13 +91,13 @@ def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str
             if not isinstance(entry, list) or len(entry) != 3:
                 raise InputError(place, "is not three numbers", f"give {key} = [ , , ]")
             for name, item in zip(VECTORS[key], entry, strict=True):
-                numbers[name] = read_number(name, item, place, free=False, unit=coefficient_unit(name))
+                numbers[name] = read_number(name, item, place, free=False)
         elif key in ("length", "diameter", "reference_density"):
             hull[key] = read_number(key, entry, place, free=False)[0]
             if hull[key] <= 0.0:
                 raise InputError(place, f"is {hull[key]:g}", "give a positive number")
         else:
-            numbers[key] = read_number(key, entry, place, free=False, unit=coefficient_unit(key))
+            numbers[key] = read_number(key, entry, place, free=False)
     return numbers, hull
 
 

@@ -77,8 +77,7 @@ class SubmergedBody(AbstractVehicle):
         columns, time = timed(self.layout, signals, state[..., 0])
         known: dict[str, Signal] = dict(zip(names, columns, strict=True))
         pick = lambda kind: {n.removeprefix(kind): v for n, v in known.items() if n.startswith(kind)}
-        order = [VELOCITIES[e] for e in self.layout.equations] + list(self.layout.positions)
-        known |= {name: state[..., i] for i, name in enumerate(order)}
+        known |= {name: state[..., i] for i, name in enumerate(self.layout.states)}
         zero = jnp.zeros_like(state[..., 0])
         rates = {e: known.get(VELOCITIES[e], zero) for e in EQUATIONS}
         if "u" not in known:

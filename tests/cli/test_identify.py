@@ -45,7 +45,7 @@ def test_methods_offered_are_those_there_are():
 @pytest.mark.parametrize("method", ["gauss-newton", "newton", "mekf"])
 def test_coefficients_come_with_errors_and_verdicts(files, monkeypatch, capsys, method):
     said = identify(monkeypatch, capsys, files, "--method", method)
-    assert said.index("The recordings determine 3 of 3 directions") < said.index("standard")
+    assert said.index("The recordings determine 3 of 3 directions") < said.index("standard error")
     found = json.loads((files / "out" / "identification.json").read_text(encoding="utf-8"))
     assert found["method"] == method
     assert {line["kind"] for line in found["identifiability"]["verdicts"]} == {"identified"}

@@ -42,6 +42,7 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
     accepted = verdict in ("named", "ambiguous")
     found = accepted or described
     missing = verdict != "none"
+    fit = _fit(missing, found)
     return Diagnosis(
         verdict=verdict,
         vehicle="NPS AUV II",
@@ -49,7 +50,8 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
         p_value=0.0 if missing else 0.43,
         where=_places() if missing else [],
         physics=[_physics(verdict)] if accepted else [],
-        fit=_fit(missing, found),
+        fit=fit,
+        history=[(model, fit["held_out"][model]) for model in ("baseline", "improved")[: 1 + found]],
         candidates=_candidates(verdict),
         forces=[trace(make, run, samples, float(missing)) for run in ("turns-1", "zigzag-2")],
         remaining_forces=[trace(make, run, samples, 0.0) for run in ("turns-1", "zigzag-2")] if found else [],
