@@ -111,6 +111,7 @@ def lagging():
     return discretise(nps_auv_ii().with_effect(ActuatorLag("rudder", number(1.5))), DT)
 
 
+@pytest.mark.long
 def test_flight_keeps_limits_and_a_model_with_the_lag_steers_better(lagging, plant):
     t = DT * np.arange(120)
     wanted = {"z": np.where(t < 2.0, 0.0, 3.0), "psi": 0.5 * np.sin(2.0 * np.pi * t / 24.0)}

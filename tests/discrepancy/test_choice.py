@@ -64,6 +64,7 @@ def astray(runs, share, *names):
     return evaluate(gone, runs, start, sigma, **ended, result=RESULTS.successful)
 
 
+@pytest.mark.long
 def test_a_fit_that_went_astray_is_looked_at_from_the_file_too():
     """Claim: from numbers that a fit might have run away to, with their signs turned, the file's lead back."""
     gone = astray(batch(wrong(), recorded(None, 2)[:2]), -20.0, "Z_q", "M_w")

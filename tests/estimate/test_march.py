@@ -131,7 +131,7 @@ def test_what_has_no_c_is_refused():
     uneven = dataclasses.replace(uneven, runs=dataclasses.replace(uneven.runs, steps=jnp.array([0.1, 0.2])))
     with pytest.raises(InputError, match="unevenly"):
         uneven.in_c()
-    effects = {effect.name: effect for effect in chosen(body())}
+    effects = {effect.name: effect for effect in chosen(oscillator())}
     for name, why in {"actuator-lag": "actuators: answer to what is estimated", "sensor-delay": "more than"}.items():
         with pytest.raises(InputError, match=why):
-            problem(body().with_effect(effects[name]), lengths=(8,), hold=2).in_c()
+            problem(oscillator().with_effect(effects[name]), lengths=(8,), hold=2).in_c()

@@ -148,6 +148,7 @@ def test_design_beats_every_standard_manoeuvre_of_its_energy_and_shakes_a_resona
     assert power[np.abs(omega - 2.0) < 0.6].sum() > 0.8 * power.sum()
 
 
+@pytest.mark.long
 def test_design_and_its_rivals_keep_the_limits_of_channels():
     vehicle = dsrv()
     limits = Limits({"delta_s": 0.2}, {"delta_s": 0.3}, {"theta": 0.15, "z": 1.0}, energy=0.2)
