@@ -13,16 +13,17 @@ from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .advice import next_manoeuvre
 from .batch import batch
-from .diagnosis import Candidate, Diagnosis, Location, Physics, Rival
+from .diagnosis import Candidate, Diagnosis, Gain, Location, Physics, Rival
 from .explain import examine, explained
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
 from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress
-from .show import channel_quality, coefficients, estimates, overlays, run_quality
+from .show import HeldOut, channel_quality, coefficients, estimates, luck, overlays, run_quality
 from .stand_in import described
 from .trial import Found, Model, Trial
+from .validation import remainders
 from .verdict import Judged, summary
 from .view import View, look
 
@@ -85,7 +86,8 @@ def _told(
     physics = [_physics(one, own) for one in judged.named]
     standing = best.added[len(named.added) :]
     models = [("baseline", before), *([("improved", after)] if best.added else [])]
-    in_units = lambda rms: {c: value * float(s) for (c, value), s in zip(rms.items(), start.sigma, strict=True)}
+    sigma = np.asarray(start.sigma)
+    in_units = lambda rms: {c: value * float(s) for (c, value), s in zip(rms.items(), sigma, strict=True)}
     diagnosis = Diagnosis(
         verdict=judged.verdict,
         vehicle=layout.name,
@@ -106,10 +108,17 @@ def _told(
         runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
         notes=[*judged.notes, *disturbance_note(best.view), *noise_note(field.signals)],
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
+        remains={label: remainders(shown.error, held, layout, sigma) for label, shown in models},
+        gain=_gain(before, after) if best.added else None,
         history=[(label, in_units(shown.rms)) for label, shown in models],
         explanations=_explanations(judged, improved.vehicle),
     )
     return diagnosis, improved.vehicle
+
+
+def _gain(before: HeldOut, after: HeldOut) -> Gain:
+    said = luck(before, after, True, freely=True)
+    return Gain(said.free, said.free_probability)
 
 
 def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:

@@ -96,6 +96,47 @@ class Overlay:
 
 
 @dataclasses.dataclass(frozen=True)
+class Remainder:
+    """What a model, running free, leaves of one channel of the runs that no fit saw.
+
+    **Fields**
+
+    - `low`, `high`: the ends of the 95 % interval of rms(residual)/σ.
+    - `lagged`: (L,) correlation of the residual with itself 1 … L samples later; `samples`: how many were measured.
+    - `random`: how probable correlations so large are in noise.
+    - `inputs`: (2L + 1,) correlation of the residual with each input −L … L samples before it, in standard errors.
+    - `follows`: the input that it goes with most; `independent`: how probable so much is where it goes with none.
+    """
+
+    low: float
+    high: float
+    samples: int
+    lagged: np.ndarray
+    random: float
+    inputs: dict[str, np.ndarray]
+    follows: str | None
+    independent: float
+
+    def to_json(self) -> dict[str, Any]:
+        """What of it is a number: the interval and the two tests."""
+        return {
+            "rms_interval": [self.low, self.high],
+            "random_p_value": self.random,
+            "follows": self.follows,
+            "independent_p_value": self.independent,
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class Gain:
+    """The share of squared errors that is `left` of free runs through what no fit saw, and how probable it is `luck`
+    that any is gone."""
+
+    left: float
+    luck: float
+
+
+@dataclasses.dataclass(frozen=True)
 class Coefficient:
     """One free number before and after; `verdict` is `identified`, `weak` (standard error above half its size), or
     `not excited` (the recordings leave it open)."""
@@ -138,11 +179,13 @@ class RunQuality:
 class Diagnosis:
     """The answer to "what physics was left out", with all that shows it.
 
-    `history` is (`baseline` or the label of the effect accepted next, held-out rms error by channel in SI). `fit`
-    maps `train` and `held_out` to `baseline` and `improved` to rms(residual)/σ by channel. `p_value` is that of
-    the whole mismatch, corrected for everything tried. `summary` is the verdict in one sentence, `notes` what a
-    reader must know besides. `explanations` are the vehicles that explain the recordings about as well where the
-    verdict is `ambiguous`: the improved one, and those with a rival in the place of what is least certain.
+    `history` is (`baseline` or the label of the effect accepted next, held-out rms error by channel in SI). `fit` maps
+    `train` and `held_out` to `baseline` and `improved` to rms(residual)/σ by channel. `p_value` is that of the whole
+    mismatch, corrected for everything tried. `remains` maps `baseline` and `improved` to what each leaves of the
+    held-out runs by channel, and `gain` is what the one gains over the other there. `summary` is the verdict in one
+    sentence, `notes` what a reader must know besides. `explanations` are the vehicles that explain the recordings about
+    as well where the verdict is `ambiguous`: the improved one, and those with a rival in the place of what is least
+    certain.
     """
 
     verdict: Verdict
@@ -161,6 +204,8 @@ class Diagnosis:
     runs: list[RunQuality]
     notes: list[str]
     next_manoeuvre: str | None
+    remains: dict[str, dict[str, Remainder]] = dataclasses.field(default_factory=dict)
+    gain: Gain | None = None
     history: list[tuple[str, dict[str, float]]] = dataclasses.field(default_factory=list)
     explanations: tuple[AbstractVehicle, ...] = ()
 
@@ -205,6 +250,10 @@ class Diagnosis:
             "mismatch": {"p_value": self.p_value, "where": where},
             "physics": physics,
             "fit": self.fit,
+            "held_out_checks": {
+                model: {channel: one.to_json() for channel, one in left.items()} for model, left in self.remains.items()
+            },
+            "held_out_gain": dataclasses.asdict(self.gain) if self.gain else None,
             "next_manoeuvre": self.next_manoeuvre,
             "notes": self.notes,
         }

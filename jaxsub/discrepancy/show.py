@@ -20,7 +20,7 @@ from .whiteness import record_sigma
 _WEAK, _OPEN = 0.5, 5.0
 _BLOCKS, _DRAWS = 24, 1999
 # of a free run, whose errors go together for longer
-_LONG_BLOCKS = 4
+LONG_BLOCKS = 4
 # a free run's χ² may grow so much by chance
 _WORSE = 1.05
 _CHANCE = 0.05
@@ -104,7 +104,7 @@ class Luck(NamedTuple):
 def luck(before: HeldOut, after: HeldOut, sound: bool, *, freely: bool) -> Luck:
     """The gain of held-out runs by a fit that is `sound` or not, of what a free run asked for or not."""
     likelihood, probability = _gained(after.expected, before.expected, _BLOCKS)
-    _, free_probability = _gained(before.squares, after.squares, _LONG_BLOCKS)
+    _, free_probability = _gained(before.squares, after.squares, LONG_BLOCKS)
     total = lambda held: float(sum(squares.sum() for squares in held.squares))
     free = total(after) / max(total(before), 1e-300)
     return Luck(likelihood, probability, free, free_probability, sound, freely)

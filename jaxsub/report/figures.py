@@ -2,13 +2,17 @@
 
 from ..discrepancy.diagnosis import Diagnosis
 from .bars import draw_coefficients, draw_scan
+from .checks import draw_checks
 from .drawing import Picture, style
 from .forces import draw_forces
 from .overlay import draw_overlay
 
+_FIGURES = (draw_forces, draw_scan, draw_overlay, draw_checks, draw_coefficients)
+
 
 def draw(diagnosis: Diagnosis) -> dict[str, Picture]:
-    """The figures that the diagnosis has data for, by name: `forces`, `scan`, `before-after`, `coefficients`."""
+    """The figures that the diagnosis has data for, by name: `forces`, `scan`, `before-after`, `checks`,
+    `coefficients`."""
     with style():
-        drawn = [draw_figure(diagnosis) for draw_figure in (draw_forces, draw_scan, draw_overlay, draw_coefficients)]
+        drawn = [draw_figure(diagnosis) for draw_figure in _FIGURES]
     return {picture.name: picture for picture in drawn if picture is not None}

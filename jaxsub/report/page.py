@@ -49,6 +49,7 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
         "candidates": top_candidates(diagnosis),
         "fit_columns": tables.fit_columns(diagnosis),
         "fit_rows": tables.fit_rows(diagnosis),
+        "check_rows": tables.check_rows(diagnosis),
         "channel_rows": tables.channel_rows(diagnosis),
     }
     return _environment().get_template("template.html.j2").render(context)

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import tomlkit
 
-from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location
-from .text import number, ratio, symbol, unit
+from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location, Remainder
+from .text import UNKNOWN, number, p_value, ratio, symbol, unit
 
+_CHANCE = 1e-3  # below it what remains is not random, or goes with an input
 _MOST_INTERVALS = 6  # of one run; more are counted
 _SAME_SIGMA = 1.5  # factor by which stated and recorded noise may differ unremarked
 # rms(residual)/σ up to which a cell has each tone; the last one has no limit.
@@ -46,6 +47,22 @@ class FitRow:
 
 
 @dataclasses.dataclass(frozen=True)
+class CheckCell:
+    """One test of what a model leaves as text, `flagged` where chance alone would hardly do so."""
+
+    text: str
+    flagged: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class CheckRow:
+    """One channel's checks, each with a cell for every model: interval of rms/σ, randomness, going with an input."""
+
+    channel: str
+    cells: list[CheckCell]
+
+
+@dataclasses.dataclass(frozen=True)
 class ChannelRow:
     """One channel's noise; `factor` is recorded over stated, `flagged` when that is too far from 1."""
 
@@ -68,6 +85,14 @@ def fit_rows(diagnosis: Diagnosis) -> list[FitRow]:
     quality = diagnosis.quality
     cells = lambda channel: [_fit_cell(column.get(channel), quality.get(channel)) for column in columns]
     return [FitRow(channel, cells(channel)) for channel in channels]
+
+
+def check_rows(diagnosis: Diagnosis) -> list[CheckRow]:
+    """One row for each channel whose remainders on the held-out runs were tested."""
+    models = list(diagnosis.remains.values())
+    channels = models[0] if models else {}
+    tests = (_between, _random, _follows)
+    return [CheckRow(name, [test(left[name]) for test in tests for left in models]) for name in channels]
 
 
 def channel_rows(diagnosis: Diagnosis) -> list[ChannelRow]:
@@ -133,6 +158,19 @@ def _size(values: Sequence[float], quality: ChannelQuality) -> str:
 def _interval(start: float, end: float) -> str:
     first, last = (number(round(time, 1), 9) for time in (start, end))
     return first if first == last else f"{first}–{last}"
+
+
+def _between(left: Remainder) -> CheckCell:
+    return CheckCell(f"{ratio(left.low)}–{ratio(left.high)}" if math.isfinite(left.high) else UNKNOWN)
+
+
+def _random(left: Remainder) -> CheckCell:
+    return CheckCell(p_value(left.random), left.random < _CHANCE)
+
+
+def _follows(left: Remainder) -> CheckCell:
+    flagged = left.independent < _CHANCE
+    return CheckCell(p_value(left.independent) + (f" ({left.follows})" if flagged else ""), flagged)
 
 
 def _fit_cell(value: float | None, quality: ChannelQuality | None) -> FitCell:

@@ -29,7 +29,9 @@ DT = 0.2
 MAKERS = {"nps": nps_auv_ii, "remus": remus_100, "dsrv": dsrv, "remembering": remembering}
 
 
-@pytest.fixture(scope="module", params=[pytest.param(name, marks=[pytest.mark.long] * (name == "remembering")) for name in MAKERS])
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=[pytest.mark.long] * (name == "remembering")) for name in MAKERS]
+)
 def plant(request):
     return discretise(MAKERS[request.param](), DT)
 

@@ -74,6 +74,11 @@ def test_names_locates_and_improves(effect, vocabulary):
     before, after = (found.fit["held_out"][key] for key in ("baseline", "improved"))
     assert max(before.values()) > 1.2
     assert max(after.values()) < 1.15
+    assert min(left.random for left in found.remains["baseline"].values()) < 1e-6
+    for channel, left in found.remains["improved"].items():
+        assert min(left.random, left.independent) > 1e-3
+        assert left.low < after[channel] < left.high
+    assert found.gain.left < 0.8 and found.gain.luck < 0.01
     outcomes = {candidate.label: candidate.outcome for candidate in found.candidates}
     assert outcomes[physics.label] == "accepted"
     assert {outcomes[rival.label] for rival in physics.rivals if rival.label in outcomes} <= {"rival"}
@@ -97,6 +102,7 @@ def test_nothing_concealed_is_none():
     assert (found.verdict, found.physics, found.where) == ("none", [], [])
     assert found.p_value > 0.01
     assert found.fit["held_out"]["baseline"] == found.fit["held_out"]["improved"]
+    assert [*found.remains] == ["baseline"] and found.gain is None
     assert next_run(found, recorded(None, 5)[:2]) is None
 
 

@@ -11,8 +11,10 @@ from jaxsub.discrepancy.diagnosis import (
     Coefficient,
     Diagnosis,
     Estimate,
+    Gain,
     Location,
     Physics,
+    Remainder,
     Rival,
     RunQuality,
 )
@@ -42,7 +44,7 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
     accepted = verdict in ("named", "ambiguous")
     found = accepted or described
     missing = verdict != "none"
-    fit = _fit(missing, found)
+    fit, models = _fit(missing, found), ("baseline", "improved")[: 1 + found]
     return Diagnosis(
         verdict=verdict,
         vehicle="NPS AUV II",
@@ -51,7 +53,7 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
         where=_places() if missing else [],
         physics=[_physics(verdict)] if accepted else [],
         fit=fit,
-        history=[(model, fit["held_out"][model]) for model in ("baseline", "improved")[: 1 + found]],
+        history=[(model, fit["held_out"][model]) for model in models],
         candidates=_candidates(verdict),
         forces=[trace(make, run, samples, float(missing)) for run in ("turns-1", "zigzag-2")],
         remaining_forces=[trace(make, run, samples, 0.0) for run in ("turns-1", "zigzag-2")] if found else [],
@@ -69,6 +71,8 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
         ],
         notes=["The noise recorded in p is twice the stated one.", "Heave was hardly excited: |w| < 0.05 m/s."],
         next_manoeuvre=_NEXT if verdict == "ambiguous" else None,
+        remains={model: _remains(make, model, missing) for model in models},
+        gain=Gain(0.12, 0.0005) if found else None,
     )  # fmt: skip
 
 
@@ -141,6 +145,20 @@ def _fit(missing: bool, found: bool) -> dict[str, dict[str, dict[str, float]]]:
         "train": {"baseline": before, "improved": after},
         "held_out": {"baseline": worse, "improved": {n: 1.02 * v for n, v in after.items()} if found else worse},
     }
+
+
+def _remains(make: np.random.Generator, model: str, missing: bool) -> dict[str, Remainder]:
+    """The baseline leaves what goes with itself and the rudder in some channels, the improved model noise."""
+    left = {}
+    for name in CHANNELS:
+        slow = 0.8 if model == "baseline" and missing and name in BEFORE else 0.0
+        lagged = slow ** np.arange(1, 61) + 0.02 * make.normal(size=60)
+        inputs = {one: make.normal(size=121) + 9.0 * slow * np.exp(-np.abs(np.arange(-60, 61)) / 9.0)
+                  for one in ("rudder", "stern planes")}  # fmt: skip
+        rms = BEFORE.get(name, 1.01) if slow else 1.0
+        left[name] = Remainder(0.9 * rms, 1.1 * rms, 1200, lagged, 1e-40 if slow else 0.4, inputs, "rudder",
+                               1e-9 if slow else 1.0)  # fmt: skip
+    return left
 
 
 def _coefficients(make: np.random.Generator, found: bool) -> list[Coefficient]:

@@ -23,10 +23,10 @@ from jaxsub.report.forces import draw_forces, telling_trace
 from jaxsub.report.overlay import affected_channels
 
 FIGURES = {
-    "none": {"forces", "scan", "before-after"},
-    "named": {"forces", "scan", "before-after", "coefficients"},
-    "ambiguous": {"forces", "scan", "before-after", "coefficients"},
-    "unknown": {"forces", "scan", "before-after"},
+    "none": {"forces", "scan", "before-after", "checks"},
+    "named": {"forces", "scan", "before-after", "checks", "coefficients"},
+    "ambiguous": {"forces", "scan", "before-after", "checks", "coefficients"},
+    "unknown": {"forces", "scan", "before-after", "checks"},
 }
 
 

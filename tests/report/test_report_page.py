@@ -96,6 +96,17 @@ def test_what_stands_in_without_a_name_is_shown_to_help():
     assert "claims no cause" not in Outline(render(diagnosis("unknown"), VEHICLE, {})).text
 
 
+def test_what_is_not_random_or_goes_with_an_input_is_flagged():
+    """Claim: of what remains each test below chance is marked, with the input's name; and the gain is weighed."""
+    made = diagnosis("named")
+    text = render(made, VEHICLE, {})
+    remains = [left for models in made.remains.values() for left in models.values()]
+    assert text.count("(rudder)") == sum(left.independent < 1e-3 for left in remains) > 0
+    table = text[text.index("What remains there") :].split("</table>")[0]
+    assert table.count(" flag") == sum((left.independent < 1e-3) + (left.random < 1e-3) for left in remains)
+    assert "keep 12\u202f% of their squared error" in Outline(text).text.replace("\xa0", "\u202f")
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_tables_are_never_empty(page, verdict):
     assert not re.search(r"<tbody>\s*</tbody>", page(verdict))

@@ -1,0 +1,126 @@
+r"""What is left of runs that no fit saw: how large it is, whether it is random, and whether it goes with an input.
+
+A model that has all the physics leaves what goes with no input, white or not; sensors' noise alone leaves what is
+white as well. Source: Ljung (1999), System Identification, ch. 16.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy import special
+
+from ..recording import Recording
+from ..vehicle import Layout
+from .diagnosis import Remainder
+from .show import LONG_BLOCKS
+from .whiteness import portmanteau
+
+_LAGS = 60
+_SURE = 0.975  # each end of an interval of 95 %
+_TINY = 1e-300
+
+# (r, K) samples of runs, zero where there is none
+Samples = Float[np.ndarray, "r k"]
+
+
+def remainders(
+    error: Sequence[Float[np.ndarray, "k c"]],
+    recordings: Sequence[Recording],
+    layout: Layout,
+    sigma: Float[np.ndarray, " c"],
+) -> dict[str, Remainder]:
+    """By channel what a model leaves of `recordings`: its free runs' `error` in SI, made up to one length."""
+    moved = {name: _stacked([run.column(column) for run in recordings]) for name, column in layout.inputs}
+    inputs = {name: _about_mean(*one) for name, one in moved.items()}
+    inputs = {name: (values, there) for name, (values, there) in inputs.items() if np.any(values)}
+    found = {}
+    for i, channel in enumerate(layout.channels):
+        _, measured = _stacked([run.column(channel) for run in recordings])
+        own = np.stack([run[: measured.shape[1], i] / sigma[i] for run in error])
+        found[channel] = _remainder(np.where(measured, own, 0.0), measured, inputs)
+    return found
+
+
+def _remainder(
+    residual: Samples, measured: Bool[np.ndarray, "r k"], inputs: dict[str, tuple[Samples, Bool[np.ndarray, "r k"]]]
+) -> Remainder:
+    count = int(measured.sum())
+    if not count or not np.all(np.isfinite(residual)):
+        return Remainder(np.nan, np.nan, count, np.zeros(0), np.nan, {}, None, np.nan)
+    low, high = _interval(residual, measured)
+    span = residual.shape[1] // 4
+    lags, own = min(_LAGS, span), correlation(residual, measured, residual, measured, span)[0]
+    errors = {name: _standardised(residual, measured, own, *one, lags) for name, one in inputs.items()}
+    most = {name: float(np.max(np.abs(one))) for name, one in errors.items()}
+    follows = max(most, key=lambda name: most[name], default=None)
+    tried = len(errors) * (2 * lags + 1)
+    chance = min(1.0, tried * float(special.erfc(most[follows] / np.sqrt(2.0)))) if follows else 1.0
+    random = portmanteau(residual[..., None], measured[..., None])
+    lagged = own[span + 1 : span + 1 + lags]
+    return Remainder(low, high, count, lagged, random, errors, follows, chance)
+
+
+def _interval(residual: Samples, measured: Bool[np.ndarray, "r k"]) -> tuple[float, float]:
+    """The ends of the 95 % interval of a residual's rms, by Student's t of its logarithm over blocks of runs.
+
+    Neighbours go together, so it is blocks that are independent. Source: Cochran (1977), Sampling Techniques, ch. 6.
+    """
+    blocks = lambda of: np.concatenate([part.sum(axis=1) for part in np.array_split(of, LONG_BLOCKS, axis=1)])
+    squares, counts = blocks(residual**2), blocks(measured)
+    squares, counts = squares[counts > 0], counts[counts > 0]
+    mean, n = squares.sum() / counts.sum(), len(counts)
+    if n < 2 or mean == 0.0:
+        return (0.0, 0.0) if mean == 0.0 else (0.0, np.inf)
+    error = np.sqrt(n / (n - 1) * np.sum((squares - mean * counts) ** 2)) / counts.sum()
+    spread = np.exp(0.5 * special.stdtrit(n - 1, _SURE) * error / mean)
+    return float(np.sqrt(mean) / spread), float(np.sqrt(mean) * spread)
+
+
+def _standardised(
+    residual: Samples, measured: np.ndarray, own: np.ndarray, signal: Samples, there: np.ndarray, lags: int
+) -> Float[np.ndarray, " l"]:
+    r"""Correlation of a residual with a signal τ = −L … L samples before it, over its standard error.
+
+    $N\,\mathrm{var}\,r_\tau = \sum_k \rho_e(k)\rho_u(k)$ where neither goes with the other (Bartlett 1946): what is
+    slow agrees with what is slow by chance. Sums are tapered, and never less than of white noise.
+    """
+    span = len(own) // 2
+    alike = own * correlation(signal, there, signal, there, span)[0]
+    taper = 1.0 - np.abs(np.arange(-span, span + 1)) / (span + 1.0)
+    found, pairs = correlation(residual, measured, signal, there, lags)
+    return found / np.sqrt(max(float(np.sum(taper * alike)), 1.0) / pairs)
+
+
+def correlation(
+    later: Samples, there: np.ndarray, earlier: Samples, here: np.ndarray, most: int
+) -> tuple[Float[np.ndarray, " l"], Float[np.ndarray, " l"]]:
+    r"""$\sum a_{k+\tau}b_k / \sqrt{\sum a_{k+\tau}^2\sum b_k^2}$ for τ = −`most` … `most`, and how many pairs each has.
+
+    Over the pairs of all runs (r, K) in which both were measured, `there` and `here`.
+    """
+    a, b = there.astype(float), here.astype(float)
+    pairs = np.maximum(np.round(_lagged(a, b, most)), 1.0)
+    energy = _lagged(later**2, b, most) * _lagged(a, earlier**2, most)
+    return _lagged(later, earlier, most) / np.sqrt(np.maximum(energy, _TINY)), pairs
+
+
+def _lagged(later: np.ndarray, earlier: np.ndarray, most: int) -> Float[np.ndarray, " l"]:
+    size = 2 * later.shape[1]
+    product = np.fft.rfft(later, size) * np.conj(np.fft.rfft(earlier, size))
+    total = np.fft.irfft(product, size).sum(axis=0)
+    return total[np.arange(-most, most + 1)]
+
+
+def _stacked(columns: Sequence[np.ndarray]) -> tuple[Samples, Bool[np.ndarray, "r k"]]:
+    """Columns of runs made up to one length, and where they have samples."""
+    values = np.full((len(columns), max(map(len, columns))), np.nan)
+    for row, column in zip(values, columns, strict=True):
+        row[: len(column)] = column
+    there = np.isfinite(values)
+    return np.where(there, values, 0.0), there
+
+
+def _about_mean(values: Samples, there: Bool[np.ndarray, "r k"]) -> tuple[Samples, Bool[np.ndarray, "r k"]]:
+    mean = values.sum(axis=1, keepdims=True) / np.maximum(there.sum(axis=1, keepdims=True), 1)
+    return np.where(there, values - mean, 0.0), there
