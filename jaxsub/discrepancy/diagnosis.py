@@ -104,7 +104,8 @@ class Remainder:
     - `low`, `high`: the ends of the 95 % interval of rms(residual)/σ.
     - `lagged`: (L,) correlation of the residual with itself 1 … L samples later; `samples`: how many were measured.
     - `random`: how probable correlations so large are in noise.
-    - `inputs`: (2L + 1,) correlation of the residual with each input −L … L samples before it, in standard errors.
+    - `inputs`: (2L + 1,) correlation of the residual with each signal that drives the model, −L … L samples before it,
+      in standard errors.
     - `follows`: the input that it goes with most; `independent`: how probable so much is where it goes with none.
     """
 

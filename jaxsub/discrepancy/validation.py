@@ -30,8 +30,12 @@ def remainders(
     layout: Layout,
     sigma: Float[np.ndarray, " c"],
 ) -> dict[str, Remainder]:
-    """By channel what a model leaves of `recordings`: its free runs' `error` in SI, made up to one length."""
-    moved = {name: _stacked([run.column(column) for run in recordings]) for name, column in layout.inputs}
+    """By channel what a model leaves of `recordings`: its free runs' `error` in SI, made up to one length.
+
+    Inputs are all that drives the model: actuators, prescribed motions and surroundings.
+    """
+    signals = (*layout.inputs, *layout.prescribed, *layout.environment)
+    moved = {name: _stacked([run.column(column) for run in recordings]) for name, column in signals}
     inputs = {name: _about_mean(*one) for name, one in moved.items()}
     inputs = {name: (values, there) for name, (values, there) in inputs.items() if np.any(values)}
     found = {}

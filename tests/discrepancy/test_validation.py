@@ -14,7 +14,7 @@ from jaxsub.vehicle import Output
 
 DT, RUNS = 0.2, 2
 LAYOUT = dataclasses.replace(
-    oscillator().layout, inputs=(("fin", "fin"), ("thrust", "thrust")), outputs=(Output("x", 0.5),)
+    oscillator().layout, inputs=(("fin", "fin"),), environment=(("thrust", "thrust"),), outputs=(Output("x", 0.5),)
 )
 INPUTS = {
     "switched": lambda rng, count: prbs(count, 15, 0.2, int(rng.integers(1e6))),
