@@ -64,7 +64,7 @@ class CheckRow:
 
 @dataclasses.dataclass(frozen=True)
 class ChannelRow:
-    """One channel's noise; `factor` is recorded over stated, `flagged` when that is too far from 1."""
+    """One channel's noise; `factor` is recorded over used, `flagged` when a stated one is too far from what it is."""
 
     quality: ChannelQuality
     factor: float
@@ -96,11 +96,12 @@ def check_rows(diagnosis: Diagnosis) -> list[CheckRow]:
 
 
 def channel_rows(diagnosis: Diagnosis) -> list[ChannelRow]:
-    """Each channel with its recorded noise over its stated one."""
+    """Each channel with its recorded noise over the one used."""
     rows = []
     for quality in diagnosis.channels:
         factor = quality.record_sigma / quality.sigma if quality.sigma > 0.0 else math.nan
-        rows.append(ChannelRow(quality, factor, factor > _SAME_SIGMA or factor < 1.0 / _SAME_SIGMA))
+        other = factor > _SAME_SIGMA or factor < 1.0 / _SAME_SIGMA
+        rows.append(ChannelRow(quality, factor, other and not quality.sigma_estimated))
     return rows
 
 

@@ -96,6 +96,14 @@ def test_what_stands_in_without_a_name_is_shown_to_help():
     assert "claims no cause" not in Outline(render(diagnosis("unknown"), VEHICLE, {})).text
 
 
+def test_a_noise_that_nobody_stated_is_no_wrong_one():
+    """Claim: where σ is what the baseline leaves, noise far below it in the recording is no warning."""
+    made = diagnosis("named")
+    channels = [dataclasses.replace(one, sigma_estimated=True, record_sigma=0.04 * one.sigma) for one in made.channels]
+    made = dataclasses.replace(made, channels=channels, notes=[])
+    assert "⚠" not in render(made, VEHICLE, {})
+
+
 def test_what_is_not_random_or_goes_with_an_input_is_flagged():
     """Claim: of what remains each test below chance is marked, with the input's name; and the gain is weighed."""
     made = diagnosis("named")
