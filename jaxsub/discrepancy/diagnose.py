@@ -20,7 +20,7 @@ from .model import allowing_for
 from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress
-from .show import HeldOut, channel_quality, coefficients, estimates, luck, overlays, run_quality
+from .show import HeldOut, channel_quality, coefficients, estimates, luck, overlays, run_quality, trades
 from .stand_in import described
 from .trial import Found, Model, Trial
 from .validation import remainders
@@ -167,6 +167,7 @@ def _physics(named: Named, improved: Fit) -> Physics:
         named.probability,
         estimates(improved, effect.label, effect.symbols()),
         rivals,
+        trades(improved, effect.label),
     )
 
 

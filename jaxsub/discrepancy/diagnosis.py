@@ -11,17 +11,32 @@ Verdict = Literal["none", "named", "ambiguous", "unknown"]
 
 
 @dataclasses.dataclass(frozen=True)
+class Regime:
+    """`variable` `above` or below a `threshold` in its SI `unit`: the mismatch is significant in the share `inside` of
+    such samples, and `outside` of the others."""
+
+    variable: str
+    above: bool
+    threshold: float
+    inside: float
+    outside: float
+    unit: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
 class Location:
     """Where the model and the recordings differ.
 
     `where` is an equation, `input:NAME` or `sensor:CHANNEL`; `share` of the mismatch that lies there; `times` (run,
-    start s, end s) of the intervals where it is significant; `grows_with` the variables it follows, closest first.
+    start s, end s) of the intervals where it is significant; `grows_with` the variables it follows, closest first;
+    `regime` what those intervals have in common, if they do.
     """
 
     where: str
     share: float
     times: list[tuple[str, float, float]]
     grows_with: list[str]
+    regime: Regime | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +59,10 @@ class Rival:
 
 @dataclasses.dataclass(frozen=True)
 class Physics:
-    """An accepted effect. `probability` is that of its name, over all of its forms."""
+    """An accepted effect. `probability` is that of its name, over all of its forms.
+
+    `trades` has the numbers of others that the recordings tell hardly apart from its own, with their correlation.
+    """
 
     effect: str
     label: str
@@ -53,6 +71,7 @@ class Physics:
     probability: float
     parameters: dict[str, Estimate]
     rivals: list[Rival]
+    trades: dict[str, float] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -230,6 +249,7 @@ class Diagnosis:
                 "times": [[start, end] for _, start, end in place.times],
                 "runs": [run for run, _, _ in place.times],
                 "grows_with": place.grows_with,
+                "regime": dataclasses.asdict(place.regime) if place.regime else None,
             }
             for place in self.where
         ]
@@ -241,6 +261,7 @@ class Diagnosis:
                 "probability": found.probability,
                 "parameters": {symbol: plain(estimate) for symbol, estimate in found.parameters.items()},
                 "rivals": [{"effect": rival.effect, "probability": rival.probability} for rival in found.rivals],
+                "trades_with": found.trades,
             }
             for found in self.physics
         ]

@@ -14,9 +14,10 @@ from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, Moti
 from ..likelihood import Disturbance, products
 from ..recording import Recording
 from .columns import difference, force_columns, output_columns
-from .diagnosis import ForceTrace, Location
+from .diagnosis import ForceTrace, Location, Regime
 from .evidence import Evidence
 from .process_noise import NoiseSignal
+from .regime import INCIDENCE, regime, regime_variables
 from .selector import Scan
 from .view import View, missing_force
 
@@ -104,22 +105,43 @@ def locations(field: Field, view: View, recordings: Sequence[Recording], share: 
         if part < _SHOWN:
             continue
         if place in view.vehicle.layout.equations:
-            times = [hit for trace in field.traces for hit in _intervals(trace, place, field.signals)]
-            grows = grows_with(view, place)
+            clear = [_clear(trace, place, field.signals) for trace in field.traces]
+            times = [hit for trace, own in zip(field.traces, clear, strict=True) for hit in _intervals(trace, own)]
+            grows, common = grows_with(view, place), _regime(view, clear)
         else:
             times = [(r.name, float(r.times[0]), float(r.times[-1])) for r in recordings]
-            grows = [place.partition(":")[2]]
-        found.append(Location(place, round(part, 4), times, grows))
+            grows, common = [place.partition(":")[2]], None
+        found.append(Location(place, round(part, 4), times, grows, common))
     return found
 
 
-def _intervals(trace: ForceTrace, equation: str, signals: Sequence[NoiseSignal]) -> list[tuple[str, float, float]]:
-    """Times at which a force stands clear of its band; less clear where a filter agrees."""
+def _regime(view: View, clear: Sequence[np.ndarray]) -> Regime | None:
+    """What the samples of each run at which a force stands `clear` of its band have in common."""
+    variables = regime_variables(view.path.start)
+    shape = next(iter(variables.values())).shape if variables else (len(clear), 0)
+    inside, live = np.zeros(shape, bool), np.zeros(shape, bool)
+    for own, there, run in zip(inside, live, clear, strict=True):
+        count = min(len(run), len(own))
+        own[:count], there[:count] = run[:count], True
+    found = regime(variables, inside, live)
+    if found is None:
+        return None
+    name = found.variable.removeprefix("abs(").removesuffix(")")
+    return dataclasses.replace(found, unit="rad" if name in INCIDENCE else view.vehicle.layout.unit(name))
+
+
+def _clear(trace: ForceTrace, equation: str, signals: Sequence[NoiseSignal]) -> np.ndarray:
+    """The samples (K,) at which a force stands clear of its band; less clear where a filter agrees."""
     size = np.abs(trace.force[equation]) / np.maximum(trace.band[equation], 1e-300)
     clear = size > _SIGNIFICANT
     for signal in signals:
         if signal.run == trace.run:
             clear |= (size > _SUPPORTED) & signal.rises(equation, trace.times)
+    return clear
+
+
+def _intervals(trace: ForceTrace, clear: np.ndarray) -> list[tuple[str, float, float]]:
+    """The times of `clear` samples, those that are close together as one interval."""
     at = np.flatnonzero(clear)
     if not len(at):
         return []

@@ -18,6 +18,9 @@ from .diagnosis import ChannelQuality, Coefficient, Estimate, Overlay, RunQualit
 from .whiteness import record_sigma
 
 _WEAK, _OPEN = 0.5, 5.0
+# correlation of two numbers from which on they are told together and hardly apart
+_TRADES = 0.9
+_TINY = 1e-300
 _BLOCKS, _DRAWS = 24, 1999
 # of a free run, whose errors go together for longer
 LONG_BLOCKS = 4
@@ -159,6 +162,22 @@ def estimates(fit: Fit, label: str, symbols: dict[str, str]) -> dict[str, Estima
     """The fitted numbers of one effect by symbol."""
     found = {symbol: _estimate(fit, f"{label}.{symbol}") for symbol in symbols.values()}
     return {symbol: estimate for symbol, estimate in found.items() if estimate is not None}
+
+
+def trades(fit: Fit, label: str) -> dict[str, float]:
+    """The numbers that a fit hardly tells apart from those of one effect, with their correlation: of 0.9 and more.
+
+    The strongest first; an effect's own among each other are its shape, and not listed.
+    """
+    own = [name.startswith(f"{label}.") for name in fit.names]
+    covariance = np.asarray(fit.covariance)
+    size = np.sqrt(np.maximum(np.diag(covariance), _TINY))
+    between = (covariance / size[:, None] / size)[own]
+    if not between.size:
+        return {}
+    worst = between[np.argmax(np.abs(between), axis=0), np.arange(len(own))]
+    found = {n: float(r) for n, r, mine in zip(fit.names, worst, own, strict=True) if not mine and abs(r) >= _TRADES}
+    return dict(sorted(found.items(), key=lambda item: -abs(item[1])))
 
 
 def _verdict(estimate: Estimate) -> str:

@@ -78,6 +78,7 @@ def _environment() -> jinja2.Environment:
         unit=text.unit,
         formula=text.formula,
         intervals=tables.intervals,
+        regime=tables.regime,
         width=_width,
         embedded=_embedded,
     )

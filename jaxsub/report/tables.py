@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 
 import tomlkit
+from markupsafe import Markup
 
-from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location, Remainder
-from .text import UNKNOWN, number, p_value, ratio, symbol, unit
+from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location, Regime, Remainder
+from .text import UNKNOWN, formula, number, p_value, ratio, symbol, unit
 
 _CHANCE = 1e-3  # below it what remains is not random, or goes with an input
 _MOST_INTERVALS = 6  # of one run; more are counted
@@ -143,6 +144,12 @@ def intervals(place: Location) -> list[str]:
         more = f" and {len(own) - _MOST_INTERVALS} more" if len(own) > _MOST_INTERVALS else ""
         lines.append(f"{run}: {', '.join(own[:_MOST_INTERVALS])} s{more}")
     return lines
+
+
+def regime(found: Regime) -> Markup:
+    """`|r| ≥ 0.12 rad/s`."""
+    size = f"{number(found.threshold, 2)} {unit(found.unit)}".rstrip()
+    return formula(found.variable) + f" {'≥' if found.above else '≤'} {size}"
 
 
 def effects_text(vehicle_text: str) -> str:

@@ -14,6 +14,7 @@ from jaxsub.discrepancy.diagnosis import (
     Gain,
     Location,
     Physics,
+    Regime,
     Remainder,
     Rival,
     RunQuality,
@@ -97,7 +98,7 @@ _SUMMARIES = {
 def _places() -> list[Location]:
     times = [("turns-1", 12.0, 31.5), ("turns-1", 48.2, 77.04), ("zigzag-2", 20.0, 95.5)]
     return [
-        Location("sway", 0.71, times, ["abs(v)", "r", "delta_r"]),
+        Location("sway", 0.71, times, ["abs(v)", "r", "delta_r"], Regime("abs(r)", True, 0.1234, 0.81, 0.06, "rad/s")),
         Location("yaw", 0.24, times[1:], ["abs(r)", "v"]),
         Location("sensor:psi", 0.05, [], []),
     ]
@@ -112,6 +113,7 @@ def _physics(verdict: str) -> Physics:
     return Physics(
         "crossflow-drag", "crossflow-drag[horizontal]", ["sway", "yaw"], "-½ρD C_d ∫ (1, x) |v + x r|(v + x r) dx",
         0.978 if sure else 0.53, {"C_d": Estimate(0.61372, 0.0214, "1")}, rivals,
+        {"Y_v": -0.973},
     )  # fmt: skip
 
 

@@ -96,6 +96,13 @@ def test_what_stands_in_without_a_name_is_shown_to_help():
     assert "claims no cause" not in Outline(render(diagnosis("unknown"), VEHICLE, {})).text
 
 
+def test_the_regime_and_what_an_effect_trades_with_are_said():
+    """Claim: a mismatch has the regime it stands out in, and an effect the coefficient it is told together with."""
+    text = Outline(render(diagnosis("named"), VEHICLE, {})).text.replace("\u202f", " ")
+    assert "|r| ≥ 0.12 rad/s81 % of it, 6 % of the rest" in text
+    assert "trades withY_v, correlation −0.97" in text
+
+
 def test_a_noise_that_nobody_stated_is_no_wrong_one():
     """Claim: where σ is what the baseline leaves, noise far below it in the recording is no warning."""
     made = diagnosis("named")
