@@ -1,6 +1,7 @@
 """What a diagnosis says: plain data that the report draws and `diagnosis.json` holds (formats.md)."""
 
 import dataclasses
+import math
 from typing import Any, Literal
 
 import numpy as np
@@ -138,12 +139,13 @@ class Remainder:
     independent: float
 
     def to_json(self) -> dict[str, Any]:
-        """What of it is a number: the interval and the two tests."""
+        """What of it is a number: the interval and the two tests; null where a run diverges or nothing was measured."""
+        said = lambda value: value if math.isfinite(value) else None
         return {
-            "rms_interval": [self.low, self.high],
-            "random_p_value": self.random,
+            "rms_interval": [said(self.low), said(self.high)],
+            "random_p_value": said(self.random),
             "follows": self.follows,
-            "independent_p_value": self.independent,
+            "independent_p_value": said(self.independent),
         }
 
 

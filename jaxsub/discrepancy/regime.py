@@ -28,7 +28,7 @@ def regime_variables(motion: Motion) -> dict[str, Float[np.ndarray, "r k"]]:
         named |= {"speed": np.sqrt(u**2 + v**2 + w**2), **dict(zip(INCIDENCE, np.arctan2([w, v], u), strict=True))}
     moving = {name: value for name, value in named.items() if np.ndim(value) == 2 and np.std(value) > _STILL}
     signed = {name: np.min(value) < 0.0 < np.max(value) for name, value in moving.items()}
-    return {f"abs({name})" if signed[name] else name: np.abs(moving[name]) for name in moving}
+    return {f"abs({name})" if signed[name] else name: np.abs(v) if signed[name] else v for name, v in moving.items()}
 
 
 def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.ndarray, "r k"]) -> Regime | None:

@@ -19,6 +19,7 @@ from .whiteness import portmanteau
 _LAGS = 60
 _SURE = 0.975  # each end of an interval of 95 %
 _TINY = 1e-300
+_STILL = 1e-9  # of its size: what moves less is rounding
 
 # (r, K) samples of runs, zero where there is none
 Samples = Float[np.ndarray, "r k"]
@@ -127,4 +128,5 @@ def _stacked(columns: Sequence[np.ndarray]) -> tuple[Samples, Bool[np.ndarray, "
 
 def _about_mean(values: Samples, there: Bool[np.ndarray, "r k"]) -> tuple[Samples, Bool[np.ndarray, "r k"]]:
     mean = values.sum(axis=1, keepdims=True) / np.maximum(there.sum(axis=1, keepdims=True), 1)
-    return np.where(there, values - mean, 0.0), there
+    moved = np.where(there, values - mean, 0.0)
+    return np.where(np.abs(moved) > _STILL * np.max(np.abs(values)), moved, 0.0), there

@@ -34,17 +34,16 @@ def draw_checks(diagnosis: Diagnosis) -> Picture | None:
     names = affected_channels(diagnosis, overlay) if overlay else []
     left = {name: {model: known[name] for model, known in diagnosis.remains.items()} for name in names}
     left = {name: models for name, models in left.items() if any(len(one.lagged) for one in models.values())}
-    if not any(left.values()):
+    if not left:
         return None
     alt = f"Correlations of what remains of {', '.join(left)} in unseen runs, with itself and with an input"
     return Picture("checks", alt, *(_render(left, page) for page in (WIDE, NARROW)))
 
 
 def _render(left: dict[str, Models], page: PageWidth) -> bytes:
-    columns = min(page.columns, 2)
-    rows = -(-2 * len(left) // columns)
+    rows = 2 * len(left) // page.columns
     figure = new_figure(page.inches, 1.5 * rows + 0.6)
-    grid = figure.subplots(rows, columns, squeeze=False)
+    grid = figure.subplots(rows, page.columns, squeeze=False)
     for (name, models), (itself, other) in zip(left.items(), grid.reshape(-1, 2), strict=True):
         _itself(itself, drawable(symbol(name)), models)
         _input(other, drawable(symbol(name)), models)

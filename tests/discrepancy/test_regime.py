@@ -69,11 +69,13 @@ def test_variables_are_speed_incidence_and_what_moves():
     rng = np.random.default_rng(3)
     states = 0.1 * rng.normal(size=(2, 50, len(vehicle.layout.states)))
     states[..., 0] += 1.8
+    states[..., 2] -= 1.5
     signals = jnp.zeros((2, 50, len(vehicle.layout.inputs)))
     found = regime_variables(eqx.filter_jit(lambda at: vehicle.motion(at, signals))(jnp.asarray(states)))
     u, v, w = np.moveaxis(states[..., :3], -1, 0)
     np.testing.assert_allclose(found["speed"], np.sqrt(u**2 + v**2 + w**2))
-    np.testing.assert_allclose(found["abs(attack)"], np.abs(np.arctan2(w, u)))
+    np.testing.assert_allclose(found["attack"], np.arctan2(w, u))
+    assert found["w"].max() < 0.0
     np.testing.assert_allclose(found["abs(sideslip)"], np.abs(np.arctan2(v, u)))
     np.testing.assert_allclose(found["u"], u)
     assert not any("rudder" in name for name in found)

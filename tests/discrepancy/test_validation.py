@@ -88,7 +88,7 @@ def test_noise_is_random_and_what_remembers_is_not():
 def test_a_run_that_diverges_or_a_channel_never_measured_has_no_numbers():
     """Claim: they are no numbers and no warning, and inputs at rest are none to go with."""
     times = DT * np.arange(100)
-    make = lambda x: Recording("run", times, {"fin": np.ones(100), "thrust": np.zeros(100), "x": x}, "test")
+    make = lambda x: Recording("run", times, {"fin": np.full(100, 0.1), "thrust": np.zeros(100), "x": x}, "test")
     wild = np.where(times > 9.0, np.inf, 1.0)[:, None]
     for error, x in ((wild, np.zeros(100)), (np.ones((100, 1)), np.full(100, np.nan))):
         found = remainders([error], [make(x)], LAYOUT, np.ones(1))["x"]
