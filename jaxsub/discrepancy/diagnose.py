@@ -23,7 +23,7 @@ from .progress import Progress
 from .show import HeldOut, channel_quality, coefficients, estimates, luck, overlays, run_quality, trades
 from .stand_in import described
 from .trial import Found, Model, Trial
-from .validation import remainders
+from .validation import beyond_noise, remainders
 from .verdict import Judged, summary
 from .view import View, look
 
@@ -88,6 +88,7 @@ def _told(
     models = [("baseline", before), *([("improved", after)] if best.added else [])]
     sigma = np.asarray(start.sigma)
     in_units = lambda rms: {c: value * float(s) for (c, value), s in zip(rms.items(), sigma, strict=True)}
+    remains = {label: remainders(shown.error, held, layout, sigma) for label, shown in models}
     diagnosis = Diagnosis(
         verdict=judged.verdict,
         vehicle=layout.name,
@@ -106,9 +107,14 @@ def _told(
         coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, start, improved),
         channels=channel_quality(improved),
         runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
-        notes=[*judged.notes, *disturbance_note(best.view), *noise_note(field.signals)],
+        notes=[
+            *judged.notes,
+            *disturbance_note(best.view),
+            *noise_note(field.signals),
+            *beyond_noise(remains[models[-1][0]], after.rms, layout),
+        ],
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
-        remains={label: remainders(shown.error, held, layout, sigma) for label, shown in models},
+        remains=remains,
         gain=_gain(before, after) if best.added else None,
         history=[(label, in_units(shown.rms)) for label, shown in models],
         explanations=_explanations(judged, improved.vehicle),

@@ -16,6 +16,7 @@ from .diagnosis import Remainder
 from .show import LONG_BLOCKS
 from .whiteness import portmanteau
 
+CHANCE = 1e-3  # below it what remains is not random, or goes with an input
 _LAGS = 60
 _SURE = 0.975  # each end of an interval of 95 %
 _TINY = 1e-300
@@ -45,6 +46,15 @@ def remainders(
         own = np.stack([run[: measured.shape[1], i] / sigma[i] for run in error])
         found[channel] = _remainder(np.where(measured, own, 0.0), measured, inputs)
     return found
+
+
+def beyond_noise(left: dict[str, Remainder], rms: dict[str, float], layout: Layout) -> list[str]:
+    """One line: the channels of stated noise in which free runs leave more than it, which is not random either."""
+    stated = [output.channel for output in layout.outputs if output.sigma is not None]
+    found = [c for c in stated if left[c].low > 1.0 and left[c].random < CHANCE]
+    led = lambda one: f", with {one.follows}" if one.independent < CHANCE else ""
+    said = ", ".join(f"{c} ({rms[c]:.2g} σ{led(left[c])})" for c in found)
+    return [f"Free runs through the held-out runs leave more than noise in {said}."] if found else []
 
 
 def _remainder(

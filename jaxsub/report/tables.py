@@ -9,9 +9,9 @@ import tomlkit
 from markupsafe import Markup
 
 from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location, Regime, Remainder
+from ..discrepancy.validation import CHANCE
 from .text import UNKNOWN, formula, number, p_value, ratio, symbol, unit
 
-_CHANCE = 1e-3  # below it what remains is not random, or goes with an input
 _MOST_INTERVALS = 6  # of one run; more are counted
 _SAME_SIGMA = 1.5  # factor by which stated and recorded noise may differ unremarked
 # rms(residual)/σ up to which a cell has each tone; the last one has no limit.
@@ -173,11 +173,11 @@ def _between(left: Remainder) -> CheckCell:
 
 
 def _random(left: Remainder) -> CheckCell:
-    return CheckCell(p_value(left.random), left.random < _CHANCE)
+    return CheckCell(p_value(left.random), left.random < CHANCE)
 
 
 def _follows(left: Remainder) -> CheckCell:
-    flagged = left.independent < _CHANCE
+    flagged = left.independent < CHANCE
     return CheckCell(p_value(left.independent) + (f" ({left.follows})" if flagged else ""), flagged)
 
 

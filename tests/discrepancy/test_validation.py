@@ -7,7 +7,7 @@ import pytest
 from rigs import oscillator
 from scipy.signal import lfilter
 
-from jaxsub.discrepancy.validation import correlation, remainders
+from jaxsub.discrepancy.validation import beyond_noise, correlation, remainders
 from jaxsub.recording import Recording
 from jaxsub.simulate.manoeuvres import prbs
 from jaxsub.vehicle import Output
@@ -83,6 +83,18 @@ def test_noise_is_random_and_what_remembers_is_not():
     found = left(0.3, "switched", 1)
     assert found.random < 1e-6
     np.testing.assert_allclose(found.lagged[:2], [0.3, 0.09], atol=0.1)
+
+
+def test_more_than_noise_is_said_where_noise_is_stated():
+    """Claim: a channel twice its stated noise that remembers is named, with the input; white noise of σ is not."""
+    slow, white, led = left(0.6, "switched", 2), left(0.0, "switched", 2), left(0.0, "switched", 2, 1.0)
+    grown = dataclasses.replace(slow, low=2.0 * slow.low, high=2.0 * slow.high)
+    (line,) = beyond_noise({"x": grown}, {"x": 2.0}, LAYOUT)
+    assert line.endswith("more than noise in x (2 σ).")
+    assert beyond_noise({"x": led}, {"x": 1.4}, LAYOUT)[0].endswith("x (1.4 σ, with fin).")
+    assert beyond_noise({"x": white}, {"x": 1.0}, LAYOUT) == []
+    unstated = dataclasses.replace(LAYOUT, outputs=(Output("x"),))
+    assert beyond_noise({"x": grown}, {"x": 2.0}, unstated) == []
 
 
 def test_a_run_that_diverges_or_a_channel_never_measured_has_no_numbers():
