@@ -99,7 +99,7 @@ def test_a_force_that_is_not_clear_alone_counts_where_the_filter_agrees():
     )
     rising = {e: np.where((TIMES > 30.0) & (TIMES < 50.0), 5.0, 1.0) for e in EQUATIONS}
     signal = NoiseSignal("run1", TIMES, 12.5, rising, rising, 2.0)
-    alone = dataclasses.replace(field, traces=[doubtful])
+    alone = dataclasses.replace(field, traces=[field.traces[0], doubtful])
     together = dataclasses.replace(alone, signals=[signal])
     share = {"heave": 1.0}
     assert locations(alone, view, runs, share)[0].times == []
