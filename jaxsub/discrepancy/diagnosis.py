@@ -122,16 +122,18 @@ class Remainder:
     **Fields**
 
     - `low`, `high`: the ends of the 95 % interval of rms(residual)/σ.
-    - `lagged`: (L,) correlation of the residual with itself 1 … L samples later; `samples`: how many were measured.
-    - `random`: how probable correlations so large are in noise.
-    - `inputs`: (2L + 1,) correlation of the residual with each signal that drives the model, −L … L samples before it,
-      in standard errors.
+    - `samples`: how many were measured. `delays`: (L,) s, from one sample to a quarter of a run, denser where shorter.
+    - `lagged`: (L,) correlation of the residual with itself so much later; `random`: how probable ones so large are in
+      noise.
+    - `inputs`: (2L + 1,) correlation of the residual with each signal that drives the model, from the longest delay
+      after it to the longest before it, in standard errors.
     - `follows`: the input that it goes with most; `independent`: how probable so much is where it goes with none.
     """
 
     low: float
     high: float
     samples: int
+    delays: np.ndarray
     lagged: np.ndarray
     random: float
     inputs: dict[str, np.ndarray]

@@ -17,7 +17,7 @@ from .show import LONG_BLOCKS
 from .whiteness import portmanteau
 
 CHANCE = 1e-3  # below it what remains is not random, or goes with an input
-_LAGS = 60
+_DELAYS = 60  # from one sample to a quarter of the longest run
 _SURE = 0.975  # each end of an interval of 95 %
 _TINY = 1e-300
 _STILL = 1e-9  # of its size: what moves less is rounding
@@ -40,11 +40,12 @@ def remainders(
     moved = {name: _stacked([run.column(column) for run in recordings]) for name, column in signals}
     inputs = {name: _about_mean(*one) for name, one in moved.items()}
     inputs = {name: (values, there) for name, (values, there) in inputs.items() if np.any(values)}
+    step = float(np.median(np.concatenate([np.diff(run.times) for run in recordings])))
     found = {}
     for i, channel in enumerate(layout.channels):
         _, measured = _stacked([run.column(channel) for run in recordings])
         own = np.stack([run[: measured.shape[1], i] / sigma[i] for run in error])
-        found[channel] = _remainder(np.where(measured, own, 0.0), measured, inputs)
+        found[channel] = _remainder(np.where(measured, own, 0.0), measured, inputs, step)
     return found
 
 
@@ -58,22 +59,25 @@ def beyond_noise(left: dict[str, Remainder], rms: dict[str, float], layout: Layo
 
 
 def _remainder(
-    residual: Samples, measured: Bool[np.ndarray, "r k"], inputs: dict[str, tuple[Samples, Bool[np.ndarray, "r k"]]]
+    residual: Samples,
+    measured: Bool[np.ndarray, "r k"],
+    inputs: dict[str, tuple[Samples, Bool[np.ndarray, "r k"]]],
+    step: float,
 ) -> Remainder:
-    count = int(measured.sum())
+    count, span = int(measured.sum()), residual.shape[1] // 4
+    later = np.unique(np.geomspace(1, max(span, 1), _DELAYS).round().astype(int))[:span]
     if not count or not np.all(np.isfinite(residual)):
-        return Remainder(np.nan, np.nan, count, np.zeros(0), np.nan, {}, None, np.nan)
+        return Remainder(np.nan, np.nan, count, step * later, np.full(len(later), np.nan), np.nan, {}, None, np.nan)
     low, high = _interval(residual, measured)
-    span = residual.shape[1] // 4
-    lags, own = min(_LAGS, span), correlation(residual, measured, residual, measured, span)[0]
-    errors = {name: _standardised(residual, measured, own, *one, lags) for name, one in inputs.items()}
+    own = correlation(residual, measured, residual, measured, span)[0]
+    either = span + np.concatenate([-later[::-1], [0], later])
+    errors = {name: _standardised(residual, measured, own, *one)[either] for name, one in inputs.items()}
     most = {name: float(np.max(np.abs(one))) for name, one in errors.items()}
     follows = max(most, key=lambda name: most[name], default=None)
-    tried = len(errors) * (2 * lags + 1)
+    tried = len(errors) * len(either)
     chance = min(1.0, tried * float(special.erfc(most[follows] / np.sqrt(2.0)))) if follows else 1.0
     random = portmanteau(residual[..., None], measured[..., None])
-    lagged = own[span + 1 : span + 1 + lags]
-    return Remainder(low, high, count, lagged, random, errors, follows, chance)
+    return Remainder(low, high, count, step * later, own[span + later], random, errors, follows, chance)
 
 
 def _interval(residual: Samples, measured: Bool[np.ndarray, "r k"]) -> tuple[float, float]:
@@ -93,9 +97,9 @@ def _interval(residual: Samples, measured: Bool[np.ndarray, "r k"]) -> tuple[flo
 
 
 def _standardised(
-    residual: Samples, measured: np.ndarray, own: np.ndarray, signal: Samples, there: np.ndarray, lags: int
+    residual: Samples, measured: np.ndarray, own: np.ndarray, signal: Samples, there: np.ndarray
 ) -> Float[np.ndarray, " l"]:
-    r"""Correlation of a residual with a signal τ = −L … L samples before it, over its standard error.
+    r"""Correlation of a residual with a signal τ samples before it, over its standard error: as many τ as `own` has.
 
     $N\,\mathrm{var}\,r_\tau = \sum_k \rho_e(k)\rho_u(k)$ where neither goes with the other (Bartlett 1946): what is
     slow agrees with what is slow by chance. Sums are tapered, and never less than of white noise.
@@ -103,7 +107,7 @@ def _standardised(
     span = len(own) // 2
     alike = own * correlation(signal, there, signal, there, span)[0]
     taper = 1.0 - np.abs(np.arange(-span, span + 1)) / (span + 1.0)
-    found, pairs = correlation(residual, measured, signal, there, lags)
+    found, pairs = correlation(residual, measured, signal, there, span)
     return found / np.sqrt(max(float(np.sum(taper * alike)), 1.0) / pairs)
 
 

@@ -25,6 +25,9 @@ _STEPS = 10
 _ENOUGH = 0.1
 # standard deviations of weak priors on the logarithms of q, τ and κ: without them an absent force has no optimum
 _LOOSE = (5.0, 1.5, 2.0)
+# times the longest run, of a time constant: what changes more slowly is constant in a run, and would hide every effect
+# that is; and how wide the edge is, of the logarithm
+_SLOWEST, _EDGE = 0.5, 0.1
 # of those logarithms: beyond, curvature says nothing
 _FARTHEST = 2.0
 # columns are filled up to a multiple of this many, so that models of several sizes share a program
@@ -64,14 +67,18 @@ def _parts(given: _Given, y: Array) -> Disturbance:
     return Disturbance(*jnp.split(jnp.exp(y), [n, 2 * n]))
 
 
-def _loose(system: System) -> Array:
-    n, c = system.G.shape[3] // 2, system.C.shape[2]
-    return jnp.repeat(jnp.asarray(_LOOSE), jnp.asarray([n, n, c]), total_repeat_length=2 * n + c)
+def _unlikely(y: Array, given: _Given) -> tuple[Array, Array]:
+    """What the priors cost, and the diagonal of its curvature."""
+    n, c = given.system.G.shape[3] // 2, given.system.C.shape[2]
+    each = lambda *values: jnp.repeat(jnp.asarray(values), jnp.asarray([n, n, c]), total_repeat_length=2 * n + c)
+    longest = jnp.max(jnp.sum(given.system.intervals, axis=-1))
+    over = jnp.maximum(y - each(jnp.inf, jnp.log(_SLOWEST * longest), jnp.inf), 0.0) / _EDGE
+    away = (y - given.centre) / each(*_LOOSE)
+    return 0.5 * jnp.sum(away**2 + over**2), each(*_LOOSE) ** -2.0 + (over > 0.0) * _EDGE**-2.0
 
 
 def _cost(y: Array, given: _Given) -> Array:
-    away = (y - given.centre) / _loose(given.system)
-    return restricted(_parts(given, y), given.system, given.columns, given.prior) + 0.5 * jnp.sum(away**2)
+    return restricted(_parts(given, y), given.system, given.columns, given.prior) + _unlikely(y, given)[0]
 
 
 def _expand(given: _Given, y: Array) -> Expansion:
@@ -90,4 +97,4 @@ def _expand(given: _Given, y: Array) -> Expansion:
     known = len(prior)
     fitted, across, own = gram[1:known, 1:known], gram[1:known, known:], gram[known:, known:]
     information = 0.5 * (own - across.T @ jnp.linalg.solve(fitted, across))
-    return Expansion(cost, gradient, information + jnp.diag(_loose(system) ** -2.0))
+    return Expansion(cost, gradient, information + jnp.diag(_unlikely(y, given)[1]))

@@ -33,7 +33,8 @@ def draw_checks(diagnosis: Diagnosis) -> Picture | None:
     overlay = telling_overlay(diagnosis)
     names = affected_channels(diagnosis, overlay) if overlay else []
     left = {name: {model: known[name] for model, known in diagnosis.remains.items()} for name in names}
-    left = {name: models for name, models in left.items() if any(len(one.lagged) for one in models.values())}
+    told = lambda models: any(np.any(np.isfinite(one.lagged)) for one in models.values())
+    left = {name: models for name, models in left.items() if told(models)}
     if not left:
         return None
     alt = f"Correlations of what remains of {', '.join(left)} in unseen runs, with itself and with an input"
@@ -48,7 +49,7 @@ def _render(left: dict[str, Models], page: PageWidth) -> bytes:
         _itself(itself, drawable(symbol(name)), models)
         _input(other, drawable(symbol(name)), models)
     for axes in grid[-1]:
-        axes.set_xlabel("samples later")
+        axes.set_xlabel("s later")
     handles = [Line2D([], [], color=_COLORS[model], label=f"{model} model") for model in next(iter(left.values()))]
     figure.legend(handles=handles, loc="outside lower left", ncols=2)
     return png(figure)
@@ -57,7 +58,7 @@ def _render(left: dict[str, Models], page: PageWidth) -> bytes:
 def _itself(axes: Axes, name: str, models: Models) -> None:
     _framed(axes, 2.0 / np.sqrt(max(1, *(one.samples for one in models.values()))))
     for model, one in models.items():
-        axes.plot(np.arange(1, len(one.lagged) + 1), one.lagged, ".-", color=_COLORS[model], markersize=3)
+        axes.plot(one.delays, one.lagged, ".-", color=_COLORS[model], markersize=3)
     axes.set_ylim(min(-0.3, axes.get_ylim()[0]), 1.05)
     axes.set_title(f"{name} with itself", fontweight="bold")
     axes.set_ylabel("correlation")
@@ -72,8 +73,8 @@ def _input(axes: Axes, name: str, models: Models) -> None:
     _framed(axes, 2.0)
     for model, one in models.items():
         if one.inputs:
-            values = one.inputs[follows[-1]]
-            axes.plot(np.arange(len(values)) - len(values) // 2, values, ".-", color=_COLORS[model], markersize=2)
+            either = np.concatenate([-one.delays[::-1], [0.0], one.delays])
+            axes.plot(either, one.inputs[follows[-1]], ".-", color=_COLORS[model], markersize=2)
     axes.set_title(f"{name} with {drawable(follows[-1], 24)}", fontweight="bold")
     axes.set_ylabel("standard errors")
 

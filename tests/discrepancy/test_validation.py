@@ -23,7 +23,7 @@ INPUTS = {
 }
 
 
-def left(memory, kind, seed, follows=0.0, count=600):
+def left(memory, kind, seed, follows=0.0, count=600, later=3):
     """What remains of an autoregressive residual of rms 1 beside inputs of a kind, a tenth of the samples missing."""
     rng = np.random.default_rng(seed)
     recordings, errors = [], []
@@ -31,11 +31,11 @@ def left(memory, kind, seed, follows=0.0, count=600):
         length = count - 50 * run
         noise = lfilter([1.0], [1.0, -memory], rng.normal(size=length + 300))[300:] * np.sqrt(1.0 - memory**2)
         fin, thrust = (INPUTS[kind](rng, length) for _ in range(2))
-        later = np.concatenate([np.zeros(3), fin[:-3]])
+        late = np.concatenate([np.zeros(later), fin[:-later]])
         x = np.where(rng.random(length) < 0.9, 0.0, np.nan)
         columns = {"fin": fin, "thrust": thrust, "x": x}
         recordings.append(Recording(f"run {run}", DT * np.arange(length), columns, "test"))
-        errors.append(np.pad(0.5 * (noise + follows * later / np.std(later)), (0, count - length))[:, None])
+        errors.append(np.pad(0.5 * (noise + follows * late / np.std(late)), (0, count - length))[:, None])
     return remainders(errors, recordings, LAYOUT, np.array([0.5]))["x"]
 
 
@@ -66,8 +66,17 @@ def test_what_goes_with_an_input_is_seen_and_when(memory, size):
     found = [left(memory, "switched", seed, size) for seed in range(30)]
     right = [one.follows == "fin" and one.independent < 1e-3 for one in found]
     assert np.mean(right) >= 0.9
-    lags = [int(np.argmax(np.abs(one.inputs["fin"]))) - 60 for one in found]
-    assert abs(np.median(lags) - 3) <= 1
+    either = np.concatenate([-found[0].delays[::-1], [0.0], found[0].delays])
+    delays = [either[np.argmax(np.abs(one.inputs["fin"]))] for one in found]
+    assert abs(np.median(delays) - 3 * DT) <= 1.01 * DT
+
+
+def test_what_follows_an_input_late_is_seen_at_its_delay():
+    """Claim: of what follows 100 samples later, a sixth of a run, the delay is told to a tenth."""
+    found = left(0.0, "switched", 3, 1.0, later=100)
+    longest = found.inputs["fin"][len(found.delays) + 1 :]
+    assert found.follows == "fin" and found.independent < 1e-3
+    assert found.delays[np.argmax(longest)] == pytest.approx(100 * DT, rel=0.1)
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
@@ -83,6 +92,7 @@ def test_noise_is_random_and_what_remembers_is_not():
     found = left(0.3, "switched", 1)
     assert found.random < 1e-6
     np.testing.assert_allclose(found.lagged[:2], [0.3, 0.09], atol=0.1)
+    np.testing.assert_allclose(found.delays[[0, 1, -1]], [DT, 2 * DT, 150 * DT])
 
 
 def test_more_than_noise_is_said_where_noise_is_stated():

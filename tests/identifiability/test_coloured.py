@@ -144,13 +144,18 @@ def test_derivatives_of_the_covariance_are_those_of_the_dense_matrix(dense):
         np.testing.assert_allclose(column, expected, rtol=1e-6, atol=1e-8)
 
 
+def posed(fit, residual):
+    """What `estimate_disturbance` takes but for its start, of residuals (R, K, c)."""
+    system = System.of(fit.model, fit.runs, fit.sigma, fit.problem.spread)
+    shown = np.concatenate([residual[..., None], np.asarray(fit.model.theta)], axis=-1)
+    weight = np.asarray(fit.runs.mask)[..., None] / SIGMA[:, None]
+    return system, Columns(jnp.asarray(shown * weight)), 1e-6 * jnp.eye(shown.shape[-1])
+
+
 def test_scoring_ends_where_a_general_minimiser_of_the_same_likelihood_does(exact):
     force = gauss_markov(np.random.default_rng(11), 1, 0.3, 1.0)
     _, residuals = refitted(exact, force, seed=12)
-    system = System.of(exact.model, exact.runs, exact.sigma, exact.problem.spread)
-    shown = np.concatenate([residuals[0][..., None], np.asarray(exact.model.theta)], axis=-1)
-    weight = np.asarray(exact.runs.mask)[..., None] / SIGMA[:, None]
-    columns, prior = Columns(jnp.asarray(shown * weight)), 1e-6 * jnp.eye(shown.shape[-1])
+    system, columns, prior = posed(exact, residuals[0])
     start = Disturbance(jnp.array([3.0]), jnp.array([10.0]), jnp.array([0.2, 5.0]))
     found = estimate_disturbance(system, columns, prior, start)
     cost = jax.jit(lambda y: restricted(Disturbance(*jnp.split(jnp.exp(y), [1, 2])), system, columns, prior))
@@ -159,6 +164,20 @@ def test_scoring_ends_where_a_general_minimiser_of_the_same_likelihood_does(exac
     assert of(start) > best.fun + 100.0
     # the search's priors on the logarithms are weak, a natural unit against 1.5 to 5
     assert of(found) < best.fun + 0.3
+
+
+def test_a_constant_force_is_no_random_one_that_never_changes(exact):
+    """Claim: however often it is sought from where it was found, its time constant stays below a run's length.
+
+    A slower one would say of every constant force that a model leaves out that it is random.
+    """
+    _, residuals = refitted(exact, np.full((RUNS, SAMPLES, 1), 0.3), seed=13)
+    posed_so = posed(exact, residuals[0])
+    found = Disturbance(jnp.array([0.1]), jnp.array([3.0]), jnp.ones(2))
+    for _ in range(5):
+        found = estimate_disturbance(*posed_so, found)
+    assert float(found.force[0]) > 0.03, "it is there"
+    assert 0.2 * SAMPLES * DT < float(found.time[0]) < SAMPLES * DT
 
 
 def test_restricted_likelihood_is_that_of_the_dense_covariance(dense):

@@ -158,8 +158,9 @@ def _remains(make: np.random.Generator, model: str, missing: bool) -> dict[str, 
         inputs = {one: make.normal(size=121) + 9.0 * slow * np.exp(-np.abs(np.arange(-60, 61)) / 9.0)
                   for one in ("rudder", "stern planes")}  # fmt: skip
         rms = BEFORE.get(name, 1.01) if slow else 1.0
-        left[name] = Remainder(0.9 * rms, 1.1 * rms, 1200, lagged, 1e-40 if slow else 0.4, inputs, "rudder",
-                               1e-9 if slow else 1.0)  # fmt: skip
+        random, independent = (1e-40, 1e-9) if slow else (0.4, 1.0)
+        delays = 0.2 * np.arange(1, 61)
+        left[name] = Remainder(0.9 * rms, 1.1 * rms, 1200, delays, lagged, random, inputs, "rudder", independent)
     return left
 
 
