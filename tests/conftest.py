@@ -17,9 +17,11 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_disable_most_optimizations", True)
 # as in the commands: tracing makes millions of objects, and collecting them often takes a twentieth of the time
 gc.set_threshold(200_000, 50, 50)
-# jax 0.10 compiles in half the time without this; later ones end the process at a flag that they do not know
+# jax 0.10 compiles in half the time without the first, and programs this small are not worth being split among threads;
+# later ones end the process at a flag that they do not know
 if jax.__version_info__[:2] == (0, 10):
-    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --xla_cpu_use_fusion_emitters=false"
+    quick = "--xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
+    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {quick}"
 # Before any test imports jaxsub, since only modules imported later are checked.
 jaxtyping.install_import_hook("jaxsub", "typechecking.checked")
 

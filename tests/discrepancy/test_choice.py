@@ -74,6 +74,7 @@ def test_a_fit_that_went_astray_is_looked_at_from_the_file_too():
         assert float(found[row.name]) == pytest.approx(float(dsrv().values()[row.name]), rel=0.2), row.name
 
 
+@pytest.mark.long
 def test_a_fit_with_more_effects_is_sought_from_the_file_too():
     """Claim: where a fit went astray its own numbers do not lead to the effect that it lacked, and the file's do."""
     runs = batch(wrong(), recorded(SensorScale("q", 0.05), 2)[:2])

@@ -16,7 +16,8 @@ from report_examples import diagnosis
 from report_traces import CHANNELS
 
 from jaxsub.discrepancy.diagnosis import ForceTrace
-from jaxsub.report.bars import moved_coefficients
+from jaxsub.report import figures
+from jaxsub.report.bars import draw_scan, moved_coefficients
 from jaxsub.report.drawing import LONGEST, drawable, style, thin
 from jaxsub.report.figures import draw
 from jaxsub.report.forces import draw_forces, telling_trace
@@ -94,13 +95,18 @@ def test_settings_of_the_caller_stay():
     assert dict(matplotlib.rcParams) == before
 
 
-def test_a_grid_that_the_caller_likes_is_not_drawn_into_ours():
+@pytest.fixture
+def only_the_scan(monkeypatch):
+    monkeypatch.setattr(figures, "_FIGURES", (draw_scan,))
+
+
+def test_a_grid_that_the_caller_likes_is_not_drawn_into_ours(only_the_scan):
     plain = draw(diagnosis("named"))["scan"].png
     with matplotlib.rc_context({"axes.grid": True}):
         assert draw(diagnosis("named"))["scan"].png == plain
 
 
-def test_a_notebook_shows_a_figure_and_prints_no_bytes_of_it():
+def test_a_notebook_shows_a_figure_and_prints_no_bytes_of_it(only_the_scan):
     formatted, _ = DisplayFormatter().format(draw(diagnosis("named"))["scan"])
     with Image.open(io.BytesIO(formatted["image/png"])) as image:
         assert image.format == "PNG"

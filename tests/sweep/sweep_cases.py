@@ -50,6 +50,7 @@ def environment(cache: Path, **more: str) -> dict[str, str]:
     root, shared = str(Path(__file__).parents[2]), jax.config.jax_compilation_cache_dir
     compiled = {"JAX_COMPILATION_CACHE_DIR": shared, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.3"}
     found = {"PYTHONPATH": root, "XDG_CACHE_HOME": str(cache), "JAX_PLATFORMS": "cpu"}
+    found["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "1"
     return os.environ | found | (compiled if shared else {}) | more
 
 

@@ -1,6 +1,7 @@
 """The answers of a sweep are those of single fits and of SciPy, however the sweep was split."""
 
 import json
+import os
 import pickle
 import subprocess
 import sys
@@ -15,6 +16,8 @@ from jaxsub.discrepancy import batch
 from jaxsub.errors import InputError
 from jaxsub.estimate import fit
 from jaxsub.sweep import OUTCOMES, answered, open_sweep, summarised, sweep
+
+TWO_DEVICES = "--xla_force_host_platform_device_count=2"
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +72,7 @@ from sweep_cases import plan
 from jaxsub.sweep import sweep
 sweep(plan(), {str(tmp_path / "out")!r})
 """
-    flags = environment(tmp_path, XLA_FLAGS="--xla_force_host_platform_device_count=2")
+    flags = environment(tmp_path, XLA_FLAGS=f"{os.environ.get('XLA_FLAGS', '')} {TWO_DEVICES}")
     subprocess.run([sys.executable, "-c", script], check=True, env=flags, timeout=300)
     assert farthest(done[1], open_sweep(tmp_path / "out")) <= 1e-9
 
