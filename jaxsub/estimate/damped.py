@@ -13,6 +13,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
+from jax.custom_batching import sequential_vmap
 from jaxtyping import Array, Bool, Float
 
 from .problem import Expansion
@@ -92,11 +93,21 @@ class Damped(optx.AbstractMinimiser):
         return y, aux, {}
 
 
+@sequential_vmap
+def _eigh(matrix: Float[Array, "d d"]) -> tuple[Float[Array, " d"], Float[Array, "d d"]]:
+    """Eigenvalues and vectors, of a batch one after the other.
+
+    jaxlib 0.10 gives each worker of XLA's pool a part of a batch and waits on one of them for the others: two programs
+    at a time, a thread for each core, then wait for each other without end.
+    """
+    return tuple(jnp.linalg.eigh(matrix))
+
+
 def _step(at: Expansion, damping: Array, longest: float) -> tuple[Array, Array, Array]:
     """The step, what its quadratic model promises to gain, and what the full step would."""
     diagonal = jnp.abs(jnp.diag(at.hessian))
     size = jnp.where(diagonal > 0.0, jnp.sqrt(diagonal), 1.0)
-    values, vectors = jnp.linalg.eigh(at.hessian / jnp.outer(size, size))
+    values, vectors = _eigh(at.hessian / jnp.outer(size, size))
     gradient = vectors.T @ (at.gradient / size)
     move = -gradient / (jnp.abs(values) + damping)
     move = move * jnp.minimum(1.0, longest / jnp.max(jnp.abs(vectors @ move / size)))

@@ -1,5 +1,8 @@
 """A pool of lanes ends every search where it would end alone, however many lanes there are and whichever fail."""
 
+import subprocess
+import sys
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -68,3 +71,26 @@ def test_recordings_of_their_own_give_each_search_its_own_optimum():
         np.testing.assert_allclose(together.y[index], alone.y[0], atol=1e-3)
         np.testing.assert_allclose(together.cost[index], alone.cost[0], rtol=1e-6)
     assert np.std(together.cost) > 1.0
+
+
+AT_ONCE = """
+from concurrent.futures import ThreadPoolExecutor
+import jax, jax.numpy as jnp, optimistix as optx
+from jaxsub.estimate.damped import Damped
+from jaxsub.estimate.problem import Expansion
+jax.config.update("jax_enable_x64", True)
+mixed = jnp.eye(40) + 0.3 * jnp.sin(jnp.arange(1600.0)).reshape(40, 40)
+cost = lambda y: jnp.sum(jnp.cosh(mixed @ y))
+expand = lambda _, y: Expansion(cost(y), jax.grad(cost)(y), jax.hessian(cost)(y))
+search = lambda y: optx.minimise(lambda y, _: cost(y), Damped(expand, 1e-9), y, max_steps=50, throw=False).value
+program = jax.jit(jax.vmap(search)).lower(jnp.ones((32, 40))).compile()
+starts = [jnp.linspace(-1.0, 1.0, 32 * 40).reshape(32, 40) + 0.01 * share for share in range(24)]
+with ThreadPoolExecutor(2) as threads:
+    ends = list(threads.map(lambda y: jax.block_until_ready(program(y)), starts))
+assert max(float(jnp.max(jnp.abs(end))) for end in ends) < 1e-3
+"""
+
+
+def test_two_programs_of_searches_at_a_time_end():
+    """Claim: a thread for each core, each in a batch of searches, and none waits for the other without end."""
+    subprocess.run([sys.executable, "-c", AT_ONCE], check=True, timeout=120)
