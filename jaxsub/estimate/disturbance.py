@@ -46,7 +46,8 @@ def estimate_disturbance(
 ) -> Disturbance:
     """The disturbance of largest restricted likelihood, or a better one than `start` where that is far from it.
 
-    The first of the `columns` is the residual; `prior` as for `restricted`.
+    The first of the `columns` is the residual; `prior` as for `restricted`. Priors hold it loosely to the `start`, and
+    its time constants below half the longest run.
     """
     known = len(prior)
     whole = -(-known // _SIDE_BY_SIDE) * _SIDE_BY_SIDE

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from diagnosis_cases import recorded, wrong
+from diagnosis_cases import INTERVAL, SAMPLES, disturbed, recorded, wrong
 
 from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.locate import traces
@@ -104,6 +104,16 @@ def test_nothing_concealed_is_none():
     assert found.fit["held_out"]["baseline"] == found.fit["held_out"]["improved"]
     assert [*found.remains] == ["baseline"] and found.gain is None
     assert next_run(found, recorded(None, 5)[:2]) is None
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("lengths", [0.5, 2.0])
+def test_a_slow_random_force_is_no_effect(lengths):
+    """Claim: forces that hardly change in a run, many times what is seen of depth, have no name in ten records."""
+    for seed in range(10):
+        runs = disturbed(lengths * SAMPLES * INTERVAL, (0.5, 1.5), seed)
+        found, _ = diagnose(wrong(), runs[:2], runs[2:])
+        assert found.physics == []
 
 
 @pytest.mark.long
