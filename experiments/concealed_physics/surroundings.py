@@ -53,7 +53,8 @@ def _suction(name: str, vehicle: str, clearance, scale: float, sign: float, limi
         pull = sign * a * m.rates["surge"] ** 2 * jnp.exp(-jnp.maximum(clearance(m), 0.0) / scale)
         return {"heave": pull, "pitch": 1.2 * pull}
 
-    return Truth(name, "heave", "environment", ("heave", "pitch"), limit, vehicle, force=force)
+    numbers = lambda a: {"Z_suction": sign * a, "M_suction": 1.2 * sign * a, "h": scale}
+    return Truth(name, "heave", "environment", ("heave", "pitch"), limit, vehicle, force=force, numbers=numbers)
 
 
 def _tether(a, m):

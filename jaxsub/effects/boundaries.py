@@ -14,76 +14,72 @@ from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal, unit_p
 
 # of the hull's diameter
 _REACHES = (0.5, 1.0, 2.0, 4.0, 8.0)
+# what a hull feels that a boundary draws to it
+_FELT = ("heave", "pitch")
 
 
 class _Suction(AbstractForce):
-    """A force that grows with the square of the speed and dies out with the distance to a boundary."""
+    """Heave and pitch that grow with the square of the speed and die out with the distance to a boundary."""
 
-    equation: eqx.AbstractVar[str]
-    coefficient: eqx.AbstractVar[Array]
+    heave: eqx.AbstractVar[Array]
+    pitch: eqx.AbstractVar[Array]
     h: eqx.AbstractVar[Array]
-    # of the heave force: towards the boundary
-    towards: eqx.AbstractClassVar[int]
 
     @property
     def where(self) -> tuple[str, ...]:
-        """The one equation."""
-        return (self.equation,)
+        """Heave, and pitch."""
+        return _FELT
 
     def symbols(self) -> dict[str, str]:
-        """SNAME symbol such as `Z_suction`, and the reach `h`."""
-        return {"coefficient": f"{FORCES[self.equation]}_suction", "h": "h"}
+        """`Z_suction`, `M_suction` and the reach `h`."""
+        return {**{e: f"{FORCES[e]}_suction" for e in _FELT}, "h": "h"}
 
     def units(self) -> dict[str, str]:
-        """Force per square of the speed, and a length."""
-        return {"coefficient": unit_per(self.equation, "surge", "surge"), "h": "m"}
-
-    def signs(self) -> dict[str, int]:
-        """Heave towards the boundary, pitch either way, a reach above zero."""
-        return {"coefficient": self.towards if self.equation == "heave" else 0, "h": 1}
-
-    @property
-    def expression(self) -> str:
-        """The force."""
-        away = "depth" if self.towards < 0 else "altitude"
-        return f"{FORCES[self.equation]}_suction u² exp(-{away}/h)"
+        """Force and moment per square of the speed, and a length."""
+        return {**{e: unit_per(e, "surge", "surge") for e in _FELT}, "h": "m"}
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The suction along the motion."""
         distance = jnp.maximum(self.distance(motion), 0.0)
-        near = jnp.exp(-distance / jnp.maximum(self.h, 1e-6))
-        return {self.equation: self.coefficient * motion.rates["surge"] ** 2 * near}
+        near = motion.rates["surge"] ** 2 * jnp.exp(-distance / jnp.maximum(self.h, 1e-6))
+        return {"heave": self.heave * near, "pitch": self.pitch * near}
 
     @abc.abstractmethod
     def distance(self, motion: Motion) -> Signal:
         """How far the boundary is, m."""
 
 
-def _felt(facts: Facts) -> list[str]:
-    return [e for e in ("heave", "pitch") if facts.kind == "submerged-body" and e in facts.equations]
+def _feels(facts: Facts) -> bool:
+    return facts.kind == "submerged-body" and set(_FELT) <= set(facts.equations)
 
 
 class FreeSurfaceSuction(_Suction):
-    r"""Suction under the free surface: $Z = Z_s u^2 e^{-z/h}$ with $Z_s \le 0$ (up), or the same in M with either sign.
+    r"""Suction under the free surface: $[Z\,M] = [Z_s\,M_s]\,u^2 e^{-z/h}$ where $Z_s \le 0$ (up).
 
-    z is the depth, $h > 0$ the reach in m.
+    $M_s$ has either sign, z is the depth and $h > 0$ the reach in m, one for both: what draws a hull to a boundary
+    draws it off its middle too.
 
     Source: Crossland (2013), ISOPE, and Newman (1977), §6, for the decay with depth.
     """
 
     name: ClassVar[str] = "free-surface-suction"
     family: ClassVar[str] = "environment"
-    towards: ClassVar[int] = -1
-    equation: str = eqx.field(static=True)
-    coefficient: Array = amplitude("1")
+    heave: Array = amplitude("1", sign=-1)
+    pitch: Array = amplitude("1")
     h: Array = shape("m", sign=+1, default=1.0)
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[FreeSurfaceSuction]":
-        """Heave and pitch of a body that measures its depth, with reaches of half to eight diameters that it felt."""
-        felt = _felt(facts) if {"z", "depth"} & set(facts.channels) else []
+        """For a body that heaves, pitches and measures its depth, reaches of half to eight diameters that it felt."""
+        if not _feels(facts) or not {"z", "depth"} & set(facts.channels):
+            return []
         reaches = [r * facts.diameter for r in _REACHES if facts.depth_range[0] < 5.0 * r * facts.diameter]
-        return [cls(e, h=number(h)) for e in felt for h in reaches]
+        return [cls(h=number(h)) for h in reaches]
+
+    @property
+    def expression(self) -> str:
+        """The force."""
+        return "[Z_suction, M_suction] u² exp(-depth/h)"
 
     def distance(self, motion: Motion) -> Signal:
         """The depth, m."""
@@ -91,25 +87,30 @@ class FreeSurfaceSuction(_Suction):
 
 
 class BottomSuction(_Suction):
-    r"""Suction over the bottom: $Z = Z_s u^2 e^{-a/h}$ with $Z_s \ge 0$ (down), or the same in M with either sign.
+    r"""Suction over the bottom: $[Z\,M] = [Z_s\,M_s]\,u^2 e^{-a/h}$ where $Z_s \ge 0$ (down).
 
-    a is the recorded `altitude`, $h > 0$ the reach in m.
+    $M_s$ has either sign, a is the recorded `altitude` and $h > 0$ the reach in m, one for both.
 
     Source: Newman (1965), and Beck and Newman (1975), for bodies close to a wall.
     """
 
     name: ClassVar[str] = "bottom-suction"
     family: ClassVar[str] = "environment"
-    towards: ClassVar[int] = 1
-    equation: str = eqx.field(static=True)
-    coefficient: Array = amplitude("1")
+    heave: Array = amplitude("1", sign=+1)
+    pitch: Array = amplitude("1")
     h: Array = shape("m", sign=+1, default=1.0)
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[BottomSuction]":
-        """Heave and pitch of a body whose recordings hold the altitude."""
-        felt = _felt(facts) if "altitude" in facts.environment else []
-        return [cls(e, h=number(r * facts.diameter)) for e in felt for r in _REACHES]
+        """For a body that heaves and pitches and whose recordings hold the altitude."""
+        if not _feels(facts) or "altitude" not in facts.environment:
+            return []
+        return [cls(h=number(r * facts.diameter)) for r in _REACHES]
+
+    @property
+    def expression(self) -> str:
+        """The force."""
+        return "[Z_suction, M_suction] u² exp(-altitude/h)"
 
     def distance(self, motion: Motion) -> Signal:
         """The recorded altitude, m."""

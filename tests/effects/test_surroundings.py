@@ -76,21 +76,20 @@ def test_wave_band_is_what_record_and_samples_resolve_and_the_sea_has(duration, 
 
 
 def test_suction_pulls_towards_its_boundary_and_dies_out():
-    depth = np.maximum(NOW.positions["z"], 0.0)
-    up = FreeSurfaceSuction("heave", one(-3.0), one(0.5)).force(NOW)["heave"]
-    np.testing.assert_allclose(up, -3.0 * RATES["surge"] ** 2 * np.exp(-2.0 * depth), rtol=1e-12)
-    down = BottomSuction("heave", one(3.0), one(0.5)).force(NOW)["heave"]
-    above = np.asarray(NOW.environment["altitude"])
-    np.testing.assert_allclose(down, 3.0 * RATES["surge"] ** 2 * np.exp(-2.0 * above), rtol=1e-12)
-    assert (up <= 0.0).all()
-    assert (down >= 0.0).all()
-    allowed = lambda effect, size: admissible(effect, {"coefficient": size, "h": 1.0})
-    assert allowed(FreeSurfaceSuction("heave"), -1.0)
-    assert not allowed(FreeSurfaceSuction("heave"), 1.0)
-    assert allowed(BottomSuction("heave"), 1.0)
-    assert not allowed(BottomSuction("heave"), -1.0)
-    assert allowed(FreeSurfaceSuction("pitch"), 1.0)
-    assert allowed(FreeSurfaceSuction("pitch"), -1.0)
+    """Claim: heave and pitch go as the squared speed and die out over one reach; heave is towards the boundary only."""
+    depth, above = np.maximum(NOW.positions["z"], 0.0), np.asarray(NOW.environment["altitude"])
+    up = FreeSurfaceSuction(one(-3.0), one(0.7), one(0.5)).force(NOW)
+    np.testing.assert_allclose(up["heave"], -3.0 * RATES["surge"] ** 2 * np.exp(-2.0 * depth), rtol=1e-12)
+    np.testing.assert_allclose(up["pitch"], 0.7 * RATES["surge"] ** 2 * np.exp(-2.0 * depth), rtol=1e-12)
+    down = BottomSuction(one(3.0), one(-0.7), one(0.5)).force(NOW)
+    np.testing.assert_allclose(down["heave"], 3.0 * RATES["surge"] ** 2 * np.exp(-2.0 * above), rtol=1e-12)
+    np.testing.assert_allclose(down["pitch"], -0.7 * RATES["surge"] ** 2 * np.exp(-2.0 * above), rtol=1e-12)
+    allowed = lambda effect, heave, pitch: admissible(effect, {"heave": heave, "pitch": pitch, "h": 1.0})
+    for pitch in (-1.0, 1.0):
+        assert allowed(FreeSurfaceSuction(), -1.0, pitch)
+        assert not allowed(FreeSurfaceSuction(), 1.0, pitch)
+        assert allowed(BottomSuction(), 1.0, pitch)
+        assert not allowed(BottomSuction(), -1.0, pitch)
 
 
 def test_boundaries_that_the_record_does_not_hold_have_no_candidates():
