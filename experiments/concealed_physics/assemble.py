@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from . import scoring
+from .truths import TRUTHS
 
 Lines = Sequence[dict]
 # condition of the table: the rows of the plan in it, and the shares that count as met
@@ -77,6 +78,8 @@ def assemble(every: Lines) -> dict:
     held = {case: gains for case, gains in held.items() if gains is not None}
     concealed = [held[line["case"]] for line in named if line["case"] in held and is_right(line, line["answer"])]
     hits = [hit for x in lines for hit in scoring.covered(x["truth"]["numbers"], x["truth"]["names"], x["answer"])]
+    families = lambda line: [TRUTHS[key].family for key in line["concealed"]]
+    told = [line for line in lines if "kinds" in line["answer"] and line["condition"] != "outside"]
     lengths = {s: [x for x in lines if x["seconds"] == s and x["condition"] in ("short",)] for s in (40.0, 80.0)}
     seconds = sorted(line["answer"]["seconds"] for line in lines if "seconds" in line["answer"])
     return {
@@ -86,6 +89,10 @@ def assemble(every: Lines) -> dict:
         "located": {
             kind: scoring.rate(scoring.first_place(x["truth"][key], ours(x)) for x in named)
             for kind, key in (("strict", "where"), ("lenient", "lenient"))
+        },
+        "kind": {
+            c: scoring.rate(scoring.first_kind(families(x), ours(x)) for x in told if x["condition"] == c)
+            for c in dict.fromkeys(x["condition"] for x in told)
         },
         "false_alarm": {k: scoring.rate(ours(x).get("verdict") != "none" for x in c) for k, c in clean.items()},
         "unknown_recall": scoring.rate(is_right(x, ours(x)) for x in lines if x["condition"] == "outside"),

@@ -29,6 +29,7 @@ def judge(folder: Path) -> dict:
     return {
         "verdict": found["verdict"],
         "physics": physics,
+        "kinds": found["mismatch"]["kinds"],
         "where": [place["equation"] for place in found["mismatch"]["where"]],
         "held_out": found["fit"]["held_out"],
         "p_value": found["mismatch"]["p_value"],

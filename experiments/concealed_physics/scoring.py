@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from jaxsub.estimate import Rate
 
 MOST_RIVALS = 4
+# what kind of thing is wrong where an effect of a family is missing; of any other family, the vehicle's structure
+KINDS = {"actuators": "actuator", "sensors": "sensor", "environment": "environment"}
 EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0)
 
 
@@ -64,6 +66,16 @@ def first_place(places: Sequence[Sequence[str]], answer: dict) -> bool:
     """Whether the first place that the answer gives is one where any concealed effect acts."""
     where = answer.get("where") or []
     return bool(where) and any(where[0] in listed for listed in places)
+
+
+def first_kind(families: Sequence[str], answer: dict) -> bool:
+    """Whether the kind of mismatch that the answer holds most probable is that of any concealed effect's family.
+
+    With nothing concealed it is random forces and noise alone.
+    """
+    true = {KINDS.get(family, "structure") for family in families} or {"disturbance"}
+    kinds = answer.get("kinds") or {}
+    return bool(kinds) and max(kinds, key=lambda kind: kinds[kind]) in true
 
 
 def forecasts(names: Sequence[str], answer: dict) -> list[tuple[float, bool]]:

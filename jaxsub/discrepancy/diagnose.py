@@ -15,6 +15,7 @@ from .advice import next_manoeuvre
 from .batch import batch
 from .diagnosis import Candidate, Diagnosis, Gain, Location, Physics, Rival
 from .explain import examine, explained
+from .kinds import kinds, right
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
 from .name import Named
@@ -114,6 +115,8 @@ def _told(
             *beyond_noise(remains[models[-1][0]], after.rms, layout),
         ],
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
+        kinds=kinds(first),
+        file_p_value=right(best.view, vehicle),
         remains=remains,
         gain=_gain(before, after) if best.added else None,
         history=[(label, in_units(shown.rms)) for label, shown in models],

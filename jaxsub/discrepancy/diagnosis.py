@@ -209,7 +209,9 @@ class Diagnosis:
     held-out runs by channel, and `gain` is what the one gains over the other there. `summary` is the verdict in one
     sentence, `notes` what a reader must know besides. `explanations` are the vehicles that explain the recordings about
     as well where the verdict is `ambiguous`: the improved one, and those with a rival in the place of what is least
-    certain.
+    certain. `kinds` is how probable it is, before anything is named, that what the recordings ask for most is of the
+    vehicle's structure, an actuator, a sensor, the environment, or nothing but random forces; `file_p_value` how
+    probable the numbers found are where those of the vehicle file are right.
     """
 
     verdict: Verdict
@@ -228,6 +230,8 @@ class Diagnosis:
     runs: list[RunQuality]
     notes: list[str]
     next_manoeuvre: str | None
+    kinds: dict[str, float] = dataclasses.field(default_factory=dict)
+    file_p_value: float | None = None
     remains: dict[str, dict[str, Remainder]] = dataclasses.field(default_factory=dict)
     gain: Gain | None = None
     history: list[tuple[str, dict[str, float]]] = dataclasses.field(default_factory=list)
@@ -273,7 +277,12 @@ class Diagnosis:
             "schema": 1,
             "verdict": self.verdict,
             "summary": self.summary,
-            "mismatch": {"p_value": self.p_value, "where": where},
+            "mismatch": {
+                "p_value": self.p_value,
+                "kinds": self.kinds,
+                "coefficients_p_value": self.file_p_value,
+                "where": where,
+            },
             "physics": physics,
             "fit": self.fit,
             "held_out_checks": {

@@ -21,6 +21,13 @@ _VERDICTS = {
     "ambiguous": "ambiguous",
     "unknown": "unknown physics",
 }
+_KINDS = {
+    "structure": "the vehicle’s structure",
+    "actuator": "an actuator",
+    "sensor": "a sensor",
+    "environment": "the surroundings",
+    "disturbance": "random forces and noise alone",
+}
 
 
 def write_report(diagnosis: Diagnosis, vehicle_text: str, folder: Path) -> None:
@@ -42,6 +49,7 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
         "diagnosis": diagnosis,
         "verdict": _VERDICTS[diagnosis.verdict],
         "pictures": pictures,
+        "kinds": _KINDS,
         "effects": tables.effects_text(vehicle_text) if diagnosis.improves else "",
         "key_numbers": _key_numbers(diagnosis),
         "force_run": telling_trace(diagnosis),

@@ -128,6 +128,27 @@ def test_right_is_named_or_among_at_most_four(names, given, expected):
     assert scoring.right(names, given) is expected
 
 
+@pytest.mark.parametrize(
+    "families, kinds, expected",
+    [
+        (["sensors"], {"structure": 0.2, "sensor": 0.8}, True),
+        (["hull", "sensors"], {"structure": 0.9, "sensor": 0.1}, True),
+        (["actuators"], {"structure": 0.9, "actuator": 0.1}, False),
+        ([], {"disturbance": 0.6, "structure": 0.4}, True),
+        ([], {"disturbance": 0.4, "structure": 0.6}, False),
+        (["hull"], None, False),
+    ],
+)
+def test_the_first_kind_is_that_of_a_concealed_effect(families, kinds, expected):
+    assert scoring.first_kind(families, {"kinds": kinds}) is expected
+
+
+def test_every_concealed_effect_is_of_a_known_kind():
+    """Claim: the families of the concealed effects are those of effects.md, so that none is structure by mistake."""
+    known = {"hull", "hydrostatics", "propulsion", "mechanisms", "outside", *scoring.KINDS}
+    assert {truth.family for truth in truths.TRUTHS.values()} == known
+
+
 def test_wilson_interval_is_scipys():
     for count, of in ((0, 7), (3, 10), (99, 100)):
         theirs = binomtest(count, of).proportion_ci(0.95, method="wilson")

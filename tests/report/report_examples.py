@@ -74,6 +74,8 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
         next_manoeuvre=_NEXT if verdict == "ambiguous" else None,
         remains={model: _remains(make, model, missing) for model in models},
         gain=Gain(0.12, 0.0005) if found else None,
+        kinds={"structure": 0.9712, "disturbance": 0.0288, "sensor": 3e-12} if missing else {"disturbance": 1.0},
+        file_p_value=3.2e-9,
     )  # fmt: skip
 
 

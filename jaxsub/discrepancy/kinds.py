@@ -1,0 +1,55 @@
+r"""What kind of thing is wrong, before anything is named: the file's numbers, structure, an actuator, a sensor, …
+
+Of each kind the evidence is the mean over its effects, every name as probable as any other before the data; that of
+`disturbance` is the evidence of random forces and noise alone. Structure has the force without a name among its own.
+
+Whether the file's numbers are right is asked of the model with what it lacked: a coefficient that has to do without
+the physics strays. $\chi^2 = d^TC^{-1}d$, d from the numbers that the recordings ask for to the file's and C the
+covariance of those.
+"""
+
+import numpy as np
+from scipy import special
+
+from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument
+from ..vehicle import AbstractVehicle
+from .trial import Found
+from .view import View
+
+_FAMILIES = {"actuators": "actuator", "sensors": "sensor", "environment": "environment"}
+_STRUCTURE, _DISTURBANCE = "structure", "disturbance"
+
+
+def kind(effect: AbstractEffect) -> str:
+    """What kind of thing is wrong where `effect` is missing; a family that is not known is structure."""
+    if isinstance(effect, AbstractActuator):
+        return "actuator"
+    return "sensor" if isinstance(effect, AbstractInstrument) else _FAMILIES.get(effect.family, _STRUCTURE)
+
+
+def kinds(found: Found) -> dict[str, float]:
+    """How probable each kind is as that of which a look at the recordings finds most, the most probable first."""
+    selector, scan = found.selector, found.naming.first
+    of_name: dict[tuple[str, str], list[float]] = {}
+    for effect, value in zip(selector.candidates, scan.value, strict=True):
+        of_name.setdefault((kind(effect), effect.name), []).append(float(value))
+    if found.pattern is not None:
+        of_name[_STRUCTURE, found.pattern.force.name] = [found.pattern.alone]
+    values = {_DISTURBANCE: [selector.value([])]}
+    for (own, _), forms in of_name.items():
+        values.setdefault(own, []).append(float(special.logsumexp(forms)))
+    mean = [special.logsumexp(names) - np.log(len(names)) for names in values.values()]
+    probability = dict(zip(values, special.softmax(mean).tolist(), strict=True))
+    return dict(sorted(probability.items(), key=lambda one: -one[1]))
+
+
+def right(view: View, file: AbstractVehicle) -> float:
+    """How probable numbers so far from the `file`'s are, of those that it leaves free, where the file's are right."""
+    names = [row.name for row in view.vehicle.layout.free]
+    own, theirs = view.vehicle.values(), file.values()
+    at = [i for i, name in enumerate(names) if name in theirs]
+    if not at:
+        return 1.0
+    away = np.array([float(theirs[names[i]]) - float(own[names[i]]) for i in at])
+    chi_squared = away @ np.linalg.solve(view.covariance[np.ix_(at, at)], away)
+    return float(special.chdtrc(len(at), max(float(chi_squared), 0.0)))

@@ -1,0 +1,58 @@
+"""The kind of mismatch is told before its name; whether the file's numbers are right, apart from what is missing."""
+
+import numpy as np
+import pytest
+from diagnosis_cases import disturbed, recorded, wrong
+
+from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.explain import examine
+from jaxsub.discrepancy.kinds import kinds, right
+from jaxsub.discrepancy.model import join
+from jaxsub.discrepancy.view import look
+from jaxsub.effects import ActuatorLag, CrossflowDrag, Current, SensorScale
+from jaxsub.estimate import fit
+from jaxsub.vehicle.catalogue import dsrv
+
+KINDS = (CrossflowDrag, ActuatorLag, Current, SensorScale)
+CONCEALED = {
+    "structure": CrossflowDrag("vertical", 5.0, 0.761, 0.3),
+    "actuator": ActuatorLag("stern_plane", 0.6),
+    "sensor": SensorScale("q", 0.05),
+}
+
+
+def baseline(runs):
+    return fit(wrong(), batch(wrong(), runs))
+
+
+@pytest.mark.parametrize("kind", CONCEALED)
+def test_what_leads_is_of_the_kind_that_was_concealed(kind):
+    """Claim: its probability is above 0.95; beside it the true numbers are not refused, and wrong ones are."""
+    effect = CONCEALED[kind]
+    start = baseline(recorded(effect, 5)[:2])
+    view = look(start, file=wrong())
+    said = kinds(examine(view, KINDS, lambda message: None))
+    assert next(iter(said)) == kind and said[kind] > 0.95
+    assert np.isclose(sum(said.values()), 1.0)
+    with_it = look(join(view, start, [effect], wrong()))
+    assert right(with_it, dsrv()) > 1e-3
+    assert right(with_it, wrong()) < 1e-6
+
+
+@pytest.mark.parametrize("runs", [recorded(None, 5)[:2], disturbed(3.0, (0.5, 1.5), 3)[:2]], ids=["clean", "disturbed"])
+def test_what_is_random_is_a_disturbance(runs):
+    """Claim: noise and random forces alone are neither structure nor a device that errs."""
+    said = kinds(examine(look(baseline(runs)), KINDS, lambda message: None))
+    assert next(iter(said)) == "disturbance" and said["disturbance"] > 0.5
+
+
+@pytest.mark.long
+def test_the_right_numbers_are_refused_as_often_as_stated():
+    """Claim: of 30 records with random forces the true numbers' p-value is below 0.1 in at most 8, and not always high.
+
+    8 or more of 30 have a chance of 1 % where one in ten is refused.
+    """
+    views = (look(baseline(disturbed(3.0, (0.5, 1.5), seed)[:2])) for seed in range(30))
+    p_values = np.array([right(view, dsrv()) for view in views])
+    assert np.sum(p_values < 0.1) <= 8
+    assert np.sum(p_values < 0.5) >= 5
