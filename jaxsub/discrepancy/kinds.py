@@ -37,8 +37,8 @@ def kinds(found: Found) -> dict[str, float]:
         of_name[_STRUCTURE, found.pattern.force.name] = [found.pattern.alone]
     values = {_DISTURBANCE: [selector.value([])]}
     for (own, _), forms in of_name.items():
-        values.setdefault(own, []).append(float(special.logsumexp(forms)))
-    mean = [special.logsumexp(names) - np.log(len(names)) for names in values.values()]
+        values.setdefault(own, []).append(float(np.logaddexp.reduce(forms)))
+    mean = [np.logaddexp.reduce(names) - np.log(len(names)) for names in values.values()]
     probability = dict(zip(values, special.softmax(mean).tolist(), strict=True))
     return dict(sorted(probability.items(), key=lambda one: -one[1]))
 
