@@ -64,6 +64,7 @@ SCENES = (
     Scene("bottom-suction", "w", "", {"h": 2.0}, body="nps-altitude"),
     Scene("tether-drag", "u"),
     Scene("coulomb-friction", "x", "x", {"F_c": 0.12, "F_0": 0.0}, body="rig"),
+    Scene("asymmetric-damping", "x", "x", body="rig"),
     Scene("cubic-stiffness", "x", "x", body="rig"),
     Scene("hysteresis", "x", "x", {"F_h": 0.4, "x_y": 0.5}, body="rig"),
     Scene("saturation", "x", "x", {"x_s": 0.3}, body="rig"),

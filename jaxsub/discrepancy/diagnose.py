@@ -32,6 +32,8 @@ from .view import View, look
 _RIVALS = 2
 # and how many a page lists: the rest are less likely still
 _SHOWN = 4
+# a mechanism's coordinate may be of any unit
+_FORCE_UNITS = {"surge": " N", "sway": " N", "heave": " N", "roll": " N m", "pitch": " N m", "yaw": " N m"}
 
 
 def diagnose(
@@ -185,7 +187,7 @@ def disturbance_note(view: View) -> list[str]:
     layout, disturbance = view.vehicle.layout, view.disturbance
     total = np.asarray(view.followed.force).std(axis=(0, 1))
     said = [
-        f"{e} ({float(q):.3g} {'N' if e in ('surge', 'sway', 'heave') else 'N m'}, {float(t):.2g} s)"
+        f"{e} ({float(q):.3g}{_FORCE_UNITS.get(e, '')}, {float(t):.2g} s)"
         for e, q, t, rms in zip(layout.equations, disturbance.force, disturbance.time, total, strict=True)
         if rms > 0.3 * float(q)
     ]

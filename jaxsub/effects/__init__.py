@@ -25,7 +25,7 @@ from .events import MassShift, ThrustLoss
 from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss
 from .hull_damping import CubicDamping, QuadraticDamping
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
-from .mechanisms import CoulombFriction, CubicStiffness, Saturation
+from .mechanisms import AsymmetricDamping, CoulombFriction, CubicStiffness, Saturation
 from .memory import AbstractMemory, FluidMemory, Hysteresis, with_memory
 from .motion import (
     CHANNEL_UNITS,
@@ -69,6 +69,7 @@ __all__ = [
     "ActuatorMisalignment",
     "ActuatorRateLimit",
     "ActuatorSaturation",
+    "AsymmetricDamping",
     "BottomSuction",
     "BuoyancyError",
     "ControlSurfaceStall",

@@ -1,4 +1,4 @@
-"""Effects of mechanisms: dry friction, springs that stiffen and springs that level off."""
+"""Effects of mechanisms: dry friction, damping that differs by direction, springs that stiffen or level off."""
 
 from collections.abc import Sequence
 from typing import ClassVar
@@ -47,6 +47,38 @@ class CoulombFriction(AbstractForce):
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The friction along the motion."""
         return {self.equation: -self.F_c * jnp.tanh(motion.rates[self.equation] / self.smoothing) - self.F_0}
+
+
+class AsymmetricDamping(AbstractForce):
+    r"""Viscous friction that differs by direction: $F = -D_a |\dot q|$, of either sign.
+
+    Beside the linear damping $D_q$ it is $D_q + D_a$ one way and $D_q - D_a$ the other, and dissipates while
+    $|D_a| \le D_q$. Source: Armstrong-Hélouvry, Dupont and Canudas de Wit (1994), Automatica 30, on drives and screws.
+    """
+
+    name: ClassVar[str] = "asymmetric-damping"
+    family: ClassVar[str] = "mechanisms"
+    equation: str = eqx.field(static=True)
+    D_a: Array = amplitude("1")
+
+    @classmethod
+    def candidates(cls, facts: Facts) -> "Sequence[AsymmetricDamping]":
+        """One for each coordinate of a mechanism."""
+        return [cls(e) for e in facts.equations] if facts.kind == "mechanism" else []
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one coordinate."""
+        return (self.equation,)
+
+    @property
+    def expression(self) -> str:
+        """The even part of the damping."""
+        return f"-D_a |{self.equation}'|"
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """The force along the motion."""
+        return {self.equation: -self.D_a * jnp.abs(motion.rates[self.equation])}
 
 
 class CubicStiffness(AbstractForce):

@@ -15,7 +15,7 @@ from .events import MassShift, ThrustLoss
 from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss
 from .hull_damping import CubicDamping, QuadraticDamping
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
-from .mechanisms import CoulombFriction, CubicStiffness, Saturation
+from .mechanisms import AsymmetricDamping, CoulombFriction, CubicStiffness, Saturation
 from .memory import FluidMemory, Hysteresis
 from .motion import Facts
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
@@ -59,6 +59,7 @@ VOCABULARY: tuple[type[AbstractEffect], ...] = (
     BottomSuction,
     TetherDrag,
     CoulombFriction,
+    AsymmetricDamping,
     CubicStiffness,
     Hysteresis,
     Saturation,

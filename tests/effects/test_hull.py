@@ -1,5 +1,7 @@
 """Hull forces are the textbook's: drag dissipates, strips add up to SciPy's integral, Coriolis forces do no work."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from scipy.integrate import quad
 
 from jaxsub.effects import (
     EQUATIONS,
+    AsymmetricDamping,
     CoriolisCoupling,
     CoulombFriction,
     CrossflowDrag,
@@ -33,6 +36,16 @@ def test_admissible_drag_takes_power_out_of_any_motion(effect):
         allowed = admissible(effect, dict(zip(amplitudes(effect), sizes, strict=True)))
         assert allowed == bool((power <= 1e-12).all())
         assert np.abs(power).max() > 0.0
+
+
+def test_damping_that_differs_by_direction_leaves_other_terminal_rates():
+    """Claim: under 3 N a rig of 2 N s/m runs at 3/(2 + D_a) one way and at 3/(2 - D_a) the other."""
+    effect, damping, size = AsymmetricDamping("x"), 2.0, 0.5
+    rates = np.array([3.0 / (damping + size), -3.0 / (damping - size)])
+    now = motion(RIG, count=2)
+    now = dataclasses.replace(now, rates={**now.rates, "x": rates})
+    balance = 3.0 * np.sign(rates) - damping * rates + np.asarray(sized(effect, [size]).force(now)["x"])
+    np.testing.assert_allclose(balance, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("plane", "sign"), [("horizontal", 1.0), ("vertical", -1.0)])

@@ -28,7 +28,7 @@ from jaxsub.effects import (
 )
 from jaxsub.units import si_unit
 
-# /work/shared/effects.md: diagnoses name effects by these, so none may be renamed
+# diagnoses name effects by these, so none may be renamed; the last is this project's addition to effects.md
 NAMES = """
 quadratic-damping cubic-damping crossflow-drag coriolis-coupling turning-speed-loss speed-scaling hull-asymmetry
 fluid-memory trim-offset buoyancy-error hull-compressibility density-stratification thermal-expansion mass-shift
@@ -36,7 +36,7 @@ actuator-lag actuator-delay actuator-rate-limit actuator-saturation actuator-dea
 actuator-misalignment control-surface-stall propeller-race propeller-torque propeller-asymmetry thrust-loss
 thruster-cross-coupling current wave-forcing free-surface-suction bottom-suction tether-drag coulomb-friction
 cubic-stiffness hysteresis saturation sensor-bias sensor-scale sensor-delay sensor-misalignment sensor-lever-arm
-sensor-saturation sensor-rectification sensor-drift
+sensor-saturation sensor-rectification sensor-drift asymmetric-damping
 """
 PAIRS, EACH = all_candidates(), one_of_each()
 of = lambda kind, pairs: [pair for pair in pairs if isinstance(pair[1], kind)]
