@@ -1,4 +1,4 @@
-"""A mechanism's friction is named for what it is: damping that differs by direction is no offset and no dry friction."""
+"""A mechanism's friction is named for what it is: damping that differs by direction is neither offset nor dry."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,7 +12,7 @@ KINDS = (AsymmetricDamping, CoulombFriction, CubicStiffness, QuadraticDamping)
 
 
 def test_damping_that_differs_by_direction_is_named():
-    """Claim: named alone beside dry friction with an offset, within three errors, and held-out runs are at the noise."""
+    """Claim: named alone beside dry friction with an offset, within three errors; held-out runs are at the noise."""
     truth = oscillator().with_effect(AsymmetricDamping("x", jnp.asarray(0.15)))
     inputs = [driven(truth, 0.1 * np.arange(400), seed, amplitude=1.0) for seed in range(3)]
     runs = synthetic(truth, inputs, seed=4)
