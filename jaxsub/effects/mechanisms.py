@@ -12,7 +12,18 @@ from .base import AbstractForce, amplitude, shape
 from .motion import Facts, Motion, Signal
 
 
-class CoulombFriction(AbstractForce):
+class AbstractCoordinateForce(AbstractForce):
+    """A force in the equation of one coordinate of a mechanism."""
+
+    equation: eqx.AbstractVar[str]
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one coordinate."""
+        return (self.equation,)
+
+
+class CoulombFriction(AbstractCoordinateForce):
     r"""Dry friction with an offset: $F = -F_c \tanh(\dot q / \dot q_s) - F_0$, $F_c \ge 0$.
 
     $\dot q_s$, a fiftieth of the rms rate, smooths the sign function so that the force has a derivative; $F_0$ is the
@@ -35,11 +46,6 @@ class CoulombFriction(AbstractForce):
         return [cls(e, float(f"{facts.rate_scale[e] / 50.0:.3g}")) for e in facts.equations]
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """The one coordinate."""
-        return (self.equation,)
-
-    @property
     def expression(self) -> str:
         """Friction and offset."""
         return f"-F_c sign({self.equation}') - F_0"
@@ -49,7 +55,7 @@ class CoulombFriction(AbstractForce):
         return {self.equation: -self.F_c * jnp.tanh(motion.rates[self.equation] / self.smoothing) - self.F_0}
 
 
-class AsymmetricDamping(AbstractForce):
+class AsymmetricDamping(AbstractCoordinateForce):
     r"""Viscous friction that differs by direction: $F = -D_a |\dot q|$, of either sign.
 
     Beside the linear damping $D_q$ it is $D_q + D_a$ one way and $D_q - D_a$ the other, and dissipates while
@@ -67,11 +73,6 @@ class AsymmetricDamping(AbstractForce):
         return [cls(e) for e in facts.equations] if facts.kind == "mechanism" else []
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """The one coordinate."""
-        return (self.equation,)
-
-    @property
     def expression(self) -> str:
         """The even part of the damping."""
         return f"-D_a |{self.equation}'|"
@@ -81,7 +82,7 @@ class AsymmetricDamping(AbstractForce):
         return {self.equation: -self.D_a * jnp.abs(motion.rates[self.equation])}
 
 
-class CubicStiffness(AbstractForce):
+class CubicStiffness(AbstractCoordinateForce):
     r"""A spring that stiffens or softens: $F = -k_3 q^3$, of either sign.
 
     Source: Duffing (1918); Silverbox benchmark.
@@ -98,11 +99,6 @@ class CubicStiffness(AbstractForce):
         return [cls(e) for e in facts.equations] if facts.kind == "mechanism" else []
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """The one coordinate."""
-        return (self.equation,)
-
-    @property
     def expression(self) -> str:
         """The restoring force."""
         return f"-k_3 {self.equation}³"
@@ -112,7 +108,7 @@ class CubicStiffness(AbstractForce):
         return {self.equation: -self.k_3 * motion.positions[self.equation] ** 3}
 
 
-class Saturation(AbstractForce):
+class Saturation(AbstractCoordinateForce):
     r"""A restoring force that levels off: $F = -F_s\tanh(q/x_s)$, $F_s \ge 0$, $x_s > 0$ where it does so.
 
     Beside a linear spring it takes over part of that one's stiffness at small q. Limits of a drive are
@@ -130,11 +126,6 @@ class Saturation(AbstractForce):
         """Each coordinate of a mechanism, levelling off at a tenth of how far it went to all of it."""
         parts = (0.1, 0.2, 0.4, 0.7, 1.0)
         return [cls(e, x_s=number(part * far)) for e, far in facts.travel.items() for part in parts]
-
-    @property
-    def where(self) -> tuple[str, ...]:
-        """The one coordinate."""
-        return (self.equation,)
 
     @property
     def expression(self) -> str:
