@@ -1,9 +1,9 @@
-"""`python -m experiments.concealed_physics --out DIR [--quick] [--part CONDITION] [--count N] [--jobs N]`.
+"""`python -m experiments.concealed_physics --out DIR [--quick] [--part CONDITION] [--count N] [--skip N] [--jobs N]`.
 
 Every case is a set of files that conceal physics, and the answer of `jaxsub diagnose`, which sees only them.
 `DIR/cases.jsonl` holds a line for each case that is done; an interrupted run goes on where it stopped, and
 `results.json` and the figures are drawn from all of its lines. Cases are ordered so that at any time every condition
-has been done in proportion.
+has been done in proportion. `--skip` leaves out the first of that order: those that the engine was mended on prove less.
 """
 
 import argparse
@@ -30,13 +30,14 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="about a dozen cases")
     parser.add_argument("--part", choices=list(COUNTS), help="this condition alone")
     parser.add_argument("--count", type=int, help="so many cases of each condition")
+    parser.add_argument("--skip", type=int, default=0, help="leave out so many cases, the first of the order")
     parser.add_argument("--jobs", type=int, default=1, help="cases at once")
     chosen = parser.parse_args()
     counts = {c: chosen.count or counts[chosen.quick] for c, counts in COUNTS.items() if chosen.part in (None, c)}
     chosen.out.mkdir(parents=True, exist_ok=True)
     path = chosen.out / "cases.jsonl"
     done = {line["case"] for line in read(path)}
-    todo = [case for case in ordered(counts) if case.name not in done]
+    todo = [case for case in ordered(counts)[chosen.skip :] if case.name not in done]
     run(todo, path, chosen.jobs)
     results = assemble(read(path))
     (chosen.out / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
