@@ -3,7 +3,7 @@
 Every case is a set of files that conceal physics, and the answer of `jaxsub diagnose`, which sees only them.
 `DIR/cases.jsonl` holds a line for each case that is done; an interrupted run goes on where it stopped, and
 `results.json` and the figures are drawn from all of its lines. Cases are ordered so that at any time every condition
-has been done in proportion. `--skip` leaves out the first of that order: those that the engine was mended on prove less.
+has been done in proportion. `--skip` leaves out the first of that order: what the engine was mended on proves less.
 """
 
 import argparse
