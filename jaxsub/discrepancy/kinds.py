@@ -2,6 +2,7 @@ r"""What kind of thing is wrong, before anything is named: the file's numbers, s
 
 Of each kind the evidence is the mean over its effects, every name as probable as any other before the data; that of
 `disturbance` is the evidence of random forces and noise alone. Structure has the force without a name among its own.
+Where a free run asked for what leads, it is the evidence of a free run: a few samples would say something else.
 
 Whether the file's numbers are right is asked of the model with what it lacked: a coefficient that has to do without
 the physics strays. $\chi^2 = d^TC^{-1}d$, d from the numbers that the recordings ask for to the file's and C the
@@ -30,16 +31,17 @@ def kind(effect: AbstractEffect) -> str:
 def kinds(found: Found) -> dict[str, float]:
     """How probable each kind is as that of which a look at the recordings finds most, the most probable first."""
     selector, scan = found.selector, found.naming.first
+    values, nothing = selector.freely_valued() if found.naming.again else (scan.value, selector.value([]))
     of_name: dict[tuple[str, str], list[float]] = {}
-    for effect, value in zip(selector.candidates, scan.value, strict=True):
+    for effect, value in zip(selector.candidates, np.where(np.isfinite(scan.value), values, -np.inf), strict=True):
         of_name.setdefault((kind(effect), effect.name), []).append(float(value))
     if found.pattern is not None:
         of_name[_STRUCTURE, found.pattern.force.name] = [found.pattern.alone]
-    values = {_DISTURBANCE: [selector.value([])]}
+    of_kind = {_DISTURBANCE: [nothing]}
     for (own, _), forms in of_name.items():
-        values.setdefault(own, []).append(float(np.logaddexp.reduce(forms)))
-    mean = [np.logaddexp.reduce(names) - np.log(len(names)) for names in values.values()]
-    probability = dict(zip(values, special.softmax(mean).tolist(), strict=True))
+        of_kind.setdefault(own, []).append(float(np.logaddexp.reduce(forms)))
+    mean = [np.logaddexp.reduce(names) - np.log(len(names)) for names in of_kind.values()]
+    probability = dict(zip(of_kind, special.softmax(mean).tolist(), strict=True))
     return dict(sorted(probability.items(), key=lambda one: -one[1]))
 
 

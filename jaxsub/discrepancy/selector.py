@@ -121,6 +121,11 @@ class Selector:
         """(m,) the share of what `chosen` leave of a free run's errors that each candidate explains."""
         return self.free.explained(self.columns(chosen), self.owners)
 
+    def freely_valued(self) -> tuple[np.ndarray, float]:
+        """(m,) log evidence of a free run's errors with each candidate alone, as `value`, and with none."""
+        without = self.free.log_evidence([])
+        return without + self.free.gains([], self.owners).evidence + self.prior, without
+
     def freely_predicted(self, chosen: Sequence[int], index: int) -> tuple[AbstractEffect, bool]:
         """A candidate with the numbers that a free run predicts beside `chosen`, and whether physics admits them."""
         own = self.owners[index]

@@ -1,13 +1,16 @@
 """The kind of mismatch is told before its name; whether the file's numbers are right, apart from what is missing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from diagnosis_cases import disturbed, recorded, wrong
 
 from jaxsub.discrepancy import batch
-from jaxsub.discrepancy.explain import examine
+from jaxsub.discrepancy.explain import examine, listed
 from jaxsub.discrepancy.kinds import kinds, right
 from jaxsub.discrepancy.model import join
+from jaxsub.discrepancy.trial import Found
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import ActuatorLag, CrossflowDrag, Current, SensorScale
 from jaxsub.estimate import fit
@@ -31,12 +34,39 @@ def test_what_leads_is_of_the_kind_that_was_concealed(kind):
     effect = CONCEALED[kind]
     start = baseline(recorded(effect, 5)[:2])
     view = look(start, file=wrong())
-    said = kinds(examine(view, KINDS, lambda message: None))
+    found = examine(view, KINDS, lambda message: None)
+    said = kinds(found)
     assert next(iter(said)) == kind and said[kind] > 0.95
     assert np.isclose(sum(said.values()), 1.0)
     with_it = look(join(view, start, [effect], wrong()))
     assert right(with_it, dsrv()) > 1e-3
     assert right(with_it, wrong()) < 1e-6
+
+
+def test_where_a_free_run_asked_the_kind_is_what_it_asked_for():
+    """Claim: a lag that says more of the next sample gives way to the drag that a free run asks for, and only then."""
+    lag, drag = CONCEALED["actuator"], CONCEALED["structure"]
+    scan = SimpleNamespace(value=np.array([900.0, 100.0]))
+    selector = SimpleNamespace(
+        candidates=[lag, drag], value=lambda chosen: 0.0, freely_valued=lambda: (np.array([20.0, 800.0]), 10.0)
+    )
+
+    def first(again):
+        found = object.__new__(Found)
+        found.__dict__.update(selector=selector, pattern=None, naming=SimpleNamespace(first=scan, again=again))
+        return next(iter(kinds(found)))
+
+    assert (first(False), first(True)) == ("actuator", "structure")
+
+
+def test_evidence_of_a_free_run_with_one_candidate_is_that_of_its_block():
+    """Claim: for all candidates at once it is what the block of each says by itself."""
+    view = look(baseline(recorded(CONCEALED["sensor"], 5)[:2]))
+    selector = listed(view, KINDS)
+    values, nothing = selector.freely_valued()
+    alone = [selector.free.log_evidence(selector.columns([i])) for i in range(len(selector.candidates))]
+    np.testing.assert_allclose(values, np.array(alone) + selector.prior, rtol=1e-8, atol=1e-6)
+    assert nothing == selector.free.log_evidence([])
 
 
 @pytest.mark.parametrize("runs", [recorded(None, 5)[:2], disturbed(3.0, (0.5, 1.5), 3)[:2]], ids=["clean", "disturbed"])
