@@ -7,9 +7,11 @@ has been done in proportion. `--skip` leaves out the first of that order: what t
 """
 
 import argparse
+import itertools
 import json
 import multiprocessing
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import threading
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 from jaxsub.cli import session
@@ -17,10 +19,10 @@ from jaxsub.cli import session
 from .assemble import assemble, is_right
 from .figures import draw
 from .plan import COUNTS, Case, ordered
-from .work import on_own_core, work
+from .work import keep_to, work
 
 # a process may hold so many compiled programs and no more
-_CASES_A_PROCESS = 3
+_CASES_A_PROCESS = 6
 
 
 def main() -> None:
@@ -46,20 +48,30 @@ def main() -> None:
 
 
 def run(todo: list[Case], path: Path, jobs: int) -> None:
-    """Append a line for each case of `todo` as soon as it is there."""
-    spawn, number, batch = multiprocessing.get_context("spawn"), 0, _CASES_A_PROCESS * jobs
-    for first in range(0, len(todo), batch):
+    """Append a line for each case of `todo` as soon as it is there; none waits for those beside it."""
+    waiting, lock, number = iter(todo), threading.Lock(), itertools.count(1)
+
+    def some() -> list[Case]:
+        with lock:
+            return list(itertools.islice(waiting, _CASES_A_PROCESS))
+
+    def tell(line: dict) -> None:
+        with lock:
+            with path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(line) + "\n")
+            told = f"{next(number)}/{len(todo)} {said(line)}"
+            session.console.print(told, highlight=False, markup=False, soft_wrap=True)
+
+    def keep_going(core: int) -> None:
+        spawn, own = multiprocessing.get_context("spawn"), (core,) if jobs > 1 else ()
         # a pool for each few cases: one that replaces its processes (max_tasks_per_child) can hang, CPython gh-115634
-        order = spawn.Value("i", 0)
-        own = {"initializer": on_own_core, "initargs": (order,)} if jobs > 1 else {}
-        with ProcessPoolExecutor(jobs, mp_context=spawn, **own) as pool:
-            for future in as_completed([pool.submit(work, case) for case in todo[first : first + batch]]):
-                line, number = future.result(), number + 1
-                with path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(line) + "\n")
-                session.console.print(
-                    f"{number}/{len(todo)} {said(line)}", highlight=False, markup=False, soft_wrap=True
-                )
+        while chosen := some():
+            with ProcessPoolExecutor(1, mp_context=spawn, initializer=keep_to, initargs=own) as pool:
+                for line in pool.map(work, chosen):
+                    tell(line)
+
+    with ThreadPoolExecutor(jobs) as threads:
+        list(threads.map(keep_going, range(jobs)))
 
 
 def said(line: dict) -> str:

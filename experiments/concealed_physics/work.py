@@ -14,12 +14,11 @@ from .peers import peers
 from .plan import Case
 
 
-def on_own_core(order) -> None:
-    """Keep a worker on one core: several that each use all of them wait for one another."""
-    with order.get_lock():
-        number, order.value = order.value, order.value + 1
-    cores = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, {cores[number % len(cores)]})
+def keep_to(*core: int) -> None:
+    """Keep a worker on a core of a number, if given: several that each use all of them wait for one another."""
+    for number in core:
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[number % len(cores)]})
 
 
 def work(case: Case) -> dict:
