@@ -15,7 +15,7 @@ from .advice import next_manoeuvre
 from .batch import batch
 from .diagnosis import Candidate, Diagnosis, Gain, Location, Physics, Rival
 from .explain import examine, explained
-from .kinds import kinds, right
+from .kinds import leading, missing, right
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
 from .name import Named
@@ -117,7 +117,7 @@ def _told(
             *beyond_noise(remains[models[-1][0]], after.rms, layout),
         ],
         next_manoeuvre=next_manoeuvre(judged.verdict, physics),
-        kinds=kinds(first),
+        kinds=missing(judged.named) if judged.named else leading(first),
         file_p_value=right(best.view, vehicle),
         remains=remains,
         gain=_gain(before, after) if best.added else None,

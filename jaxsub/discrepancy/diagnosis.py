@@ -209,9 +209,10 @@ class Diagnosis:
     held-out runs by channel, and `gain` is what the one gains over the other there. `summary` is the verdict in one
     sentence, `notes` what a reader must know besides. `explanations` are the vehicles that explain the recordings about
     as well where the verdict is `ambiguous`: the improved one, and those with a rival in the place of what is least
-    certain. `kinds` is how probable it is, before anything is named, that what the recordings ask for most is of the
-    vehicle's structure, an actuator, a sensor, the environment, or nothing but random forces; `file_p_value` how
-    probable the numbers found are where those of the vehicle file are right.
+    certain. `kinds` is how probable it is that something is wrong with the vehicle's structure, an actuator, a sensor
+    or the environment, by what was accepted and its rivals; where nothing was, by what a first look finds most of,
+    which may be random forces and noise alone (`disturbance`). `file_p_value` is how probable the numbers found are
+    where those of the vehicle file are right.
     """
 
     verdict: Verdict

@@ -1,19 +1,24 @@
-r"""What kind of thing is wrong, before anything is named: the file's numbers, structure, an actuator, a sensor, …
+r"""What kind of thing is wrong: the vehicle's structure, an actuator, a sensor, the environment, or the file's numbers.
 
-Of each kind the evidence is the mean over its effects, every name as probable as any other before the data; that of
-`disturbance` is the evidence of random forces and noise alone. Structure has the force without a name among its own.
-Where a free run asked for what leads, it is the evidence of a free run: a few samples would say something else.
+Where effects were accepted, something of a kind is missing unless each of them, or its true rival, is of another. Where
+none was, what a first look at the recordings finds most of speaks. Of each kind the evidence is then the mean over its
+effects, every name as probable as any other before the data; that of `disturbance` is the evidence of random forces and
+noise alone. Structure has the force without a name among its own. Where a free run asked for what leads, it is the
+evidence of a free run: a few samples would say something else.
 
 Whether the file's numbers are right is asked of the model with what it lacked: a coefficient that has to do without
 the physics strays. $\chi^2 = d^TC^{-1}d$, d from the numbers that the recordings ask for to the file's and C the
 covariance of those.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import special
 
 from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument
 from ..vehicle import AbstractVehicle
+from .name import Named
 from .trial import Found
 from .view import View
 
@@ -28,8 +33,20 @@ def kind(effect: AbstractEffect) -> str:
     return "sensor" if isinstance(effect, AbstractInstrument) else _FAMILIES.get(effect.family, _STRUCTURE)
 
 
-def kinds(found: Found) -> dict[str, float]:
-    """How probable each kind is as that of which a look at the recordings finds most, the most probable first."""
+def missing(named: Sequence[Named]) -> dict[str, float]:
+    """How probable it is of each kind that something of it is missing, by accepted effects and their rivals."""
+    absent: dict[str, float] = {}
+    for one in named:
+        of_kind: dict[str, float] = {}
+        for effect, probability in ((one.effect, one.probability), *one.rivals):
+            of_kind[kind(effect)] = of_kind.get(kind(effect), 0.0) + probability
+        for own, probability in of_kind.items():
+            absent[own] = absent.get(own, 1.0) * max(0.0, 1.0 - probability)
+    return _sorted({own: 1.0 - none for own, none in absent.items()})
+
+
+def leading(found: Found) -> dict[str, float]:
+    """How probable each kind is as that of which a look at the recordings finds most."""
     selector, scan = found.selector, found.naming.first
     values, nothing = selector.freely_valued() if found.naming.again else (scan.value, selector.value([]))
     of_name: dict[tuple[str, str], list[float]] = {}
@@ -42,6 +59,11 @@ def kinds(found: Found) -> dict[str, float]:
         of_kind.setdefault(own, []).append(float(np.logaddexp.reduce(forms)))
     mean = [np.logaddexp.reduce(names) - np.log(len(names)) for names in of_kind.values()]
     probability = dict(zip(of_kind, special.softmax(mean).tolist(), strict=True))
+    return _sorted(probability)
+
+
+def _sorted(probability: dict[str, float]) -> dict[str, float]:
+    """The most probable first."""
     return dict(sorted(probability.items(), key=lambda one: -one[1]))
 
 

@@ -1,4 +1,4 @@
-"""The kind of mismatch is told before its name; whether the file's numbers are right, apart from what is missing."""
+"""The kind of mismatch is told, also before its name; and, beside what is missing, whether the file's numbers are right."""
 
 from types import SimpleNamespace
 
@@ -8,8 +8,9 @@ from diagnosis_cases import disturbed, recorded, wrong
 
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.explain import examine, listed
-from jaxsub.discrepancy.kinds import kinds, right
+from jaxsub.discrepancy.kinds import leading, missing, right
 from jaxsub.discrepancy.model import join
+from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.trial import Found
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import ActuatorLag, CrossflowDrag, Current, SensorScale
@@ -35,12 +36,23 @@ def test_what_leads_is_of_the_kind_that_was_concealed(kind):
     start = baseline(recorded(effect, 5)[:2])
     view = look(start, file=wrong())
     found = examine(view, KINDS, lambda message: None)
-    said = kinds(found)
+    said = leading(found)
     assert next(iter(said)) == kind and said[kind] > 0.95
     assert np.isclose(sum(said.values()), 1.0)
     with_it = look(join(view, start, [effect], wrong()))
     assert right(with_it, dsrv()) > 1e-3
     assert right(with_it, wrong()) < 1e-6
+
+
+def test_several_accepted_effects_are_each_of_a_kind():
+    """Claim: of a drag of 0.9 with a lag for its rival and a bias that is sure, all three kinds have their chance."""
+    drag = Named(0, CONCEALED["structure"], 0.9, [(CONCEALED["actuator"], 0.1)], [])
+    bias = Named(1, CONCEALED["sensor"], 1.0, [], [])
+    assert list(missing([drag, bias]).items()) == [
+        ("sensor", 1.0),
+        ("structure", 0.9),
+        ("actuator", pytest.approx(0.1)),
+    ]
 
 
 def test_where_a_free_run_asked_the_kind_is_what_it_asked_for():
@@ -54,7 +66,7 @@ def test_where_a_free_run_asked_the_kind_is_what_it_asked_for():
     def first(again):
         found = object.__new__(Found)
         found.__dict__.update(selector=selector, pattern=None, naming=SimpleNamespace(first=scan, again=again))
-        return next(iter(kinds(found)))
+        return next(iter(leading(found)))
 
     assert (first(False), first(True)) == ("actuator", "structure")
 
@@ -72,7 +84,7 @@ def test_evidence_of_a_free_run_with_one_candidate_is_that_of_its_block():
 @pytest.mark.parametrize("runs", [recorded(None, 5)[:2], disturbed(3.0, (0.5, 1.5), 3)[:2]], ids=["clean", "disturbed"])
 def test_what_is_random_is_a_disturbance(runs):
     """Claim: noise and random forces alone are neither structure nor a device that errs."""
-    said = kinds(examine(look(baseline(runs)), KINDS, lambda message: None))
+    said = leading(examine(look(baseline(runs)), KINDS, lambda message: None))
     assert next(iter(said)) == "disturbance" and said["disturbance"] > 0.5
 
 

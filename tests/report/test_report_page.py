@@ -103,12 +103,14 @@ def test_the_regime_and_what_an_effect_trades_with_are_said():
     assert "trades withY_v, correlation −0.97" in text
 
 
-def test_the_kind_of_mismatch_is_said_before_names():
+def test_the_kind_of_mismatch_is_said():
     """Claim: every kind has its probability, and the file's numbers theirs; nothing is said where nothing was asked."""
     text = Outline(render(diagnosis("named"), VEHICLE, {})).text.replace("\u202f", " ")
     assert "the vehicle’s structure97 %" in text and "a sensor< 0.1 %" in text
     assert "p = 3.2 × 10⁻⁹ where the file’s are right" in text
-    assert "before anything is named" not in render(bare(), VEHICLE, {})
+    assert "by what was accepted" in text
+    assert "before anything is named" in render(diagnosis("unknown"), VEHICLE, {})
+    assert "What kind" not in render(bare(), VEHICLE, {})
 
 
 def test_a_noise_that_nobody_stated_is_no_wrong_one():
