@@ -1,4 +1,4 @@
-"""The kind of mismatch is told, also before its name; and, beside what is missing, whether the file's numbers are right."""
+"""The kind of mismatch is told, also before its name; and whether the file's numbers are right beside what is missing."""
 
 from types import SimpleNamespace
 
