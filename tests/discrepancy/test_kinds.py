@@ -1,4 +1,4 @@
-"""The kind of mismatch is told, also before its name; and whether the file's numbers are right beside what is missing."""
+"""The kind of mismatch is told, also before its name; and whether the numbers of the file are right beside it."""
 
 from types import SimpleNamespace
 
