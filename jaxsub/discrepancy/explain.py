@@ -7,7 +7,7 @@ import numpy as np
 from ..effects import AbstractEffect, candidates, looked_at
 from ..likelihood import whitened
 from .columns import candidate_columns
-from .evidence import Evidence
+from .evidence import Evidence, evidence_of
 from .generic import pattern
 from .model import sound, told
 from .name import MOST_EFFECTS, Naming, name
@@ -16,12 +16,14 @@ from .progress import Progress
 from .selector import Selector
 from .show import luck
 from .trial import Found, Model, Trial, tried, worth_trying
-from .verdict import NOTHING, Judged, both, idle, judge
+from .verdict import EXPLAINED, NOTHING, Judged, both, by_fit, idle, judge
 from .view import View, facts
 from .whiteness import RANDOM, Memory, memory
 
 # times that others are asked where all that was named was refused
 _REFUSALS = 2
+# of what names explain and what they leave is told by its own past, the share from which their fit is asked
+_MOST = 0.5
 
 
 def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
@@ -113,14 +115,26 @@ def without_idle(
 def after_all(
     trial: Trial, base: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged, Found | None]:
-    """The model with a name that a force without one seemed to beat, what is to be said, and what is found from there.
+    """The model with names that seemed to say too little, what is to be said, and what is found from there.
 
-    Of the same equation, and if its fit leaves no such force; else all is as it was. Where a motion is no larger than
-    its noise, a linear picture along it gives the wrong shape to a force of a rate, which nothing then seems to have.
+    A name that a force without one seemed to beat, if it is of the same equation and its fit leaves no such force:
+    where a motion is no larger than its noise, a linear picture along it gives the wrong shape to a force of a rate,
+    which nothing then seems to have. Names that seemed to explain most and too little for the cause, if their fit does
+    not: of what is large a linear picture leaves much, which is no disturbance. Else all is as it was.
     """
-    here = [one.number for one in found.naming.named if found.nameless in one.effect.where]
-    best, said = tried(trial, base, found, here[:1], judged) if here else (base, judged)
+    most = found.nameless is None and found.memory.correlated and found.memory.explained > _MOST
+    numbers = [one.number for one in found.naming.named]
+    here = numbers if most else [one.number for one in found.naming.named if found.nameless in one.effect.where][:1]
+    best, said = tried(trial, base, found, here, judged) if here else (base, judged)
     if not said.named:
         return base, judged, None
     more = examine(best.view, vocabulary, trial.progress)
-    return (base, judged, None) if more.nameless == found.nameless else (best, said, more)
+    share = _explained(base, best, more)
+    stands = more.nameless is None and share >= EXPLAINED if most else more.nameless != found.nameless
+    return (best, by_fit(said, share) if most else said, more) if stands else (base, judged, None)
+
+
+def _explained(base: Model, best: Model, found: Found) -> float:
+    """Of what a fit explains and of what the past tells beside it, as `found` from there, the fit's share."""
+    gain = 2.0 * (evidence_of(best.view) - evidence_of(base.view))
+    return max(gain, 0.0) / max(gain + found.memory.told * found.memory.correlated, 1e-300)

@@ -11,7 +11,8 @@ from .show import Luck
 from .whiteness import Memory
 
 _CERTAIN = 0.9
-_EXPLAINED = 0.75
+# of a mismatch, the share that its cause explains
+EXPLAINED = 0.75
 # log evidence by which a force without a name must beat the names to stand instead of them
 _CLEARLY = 3.0
 _BEYOND_DOUBT = 1e-6
@@ -58,10 +59,10 @@ def judge(naming: Naming, pattern: Pattern | None, memory: Memory) -> Judged:
     if pattern is not None and follows and pattern.alone > naming.value + _CLEARLY:
         notes.append(f"{labels} is the best of the vocabulary, and says less than a force without a name.")
         return Judged("unknown", [], p_value, notes)
-    if pattern is not None and follows and pattern.explained < _EXPLAINED:
+    if pattern is not None and follows and pattern.explained < EXPLAINED:
         notes.append(f"{labels} would explain {pattern.explained:.0%} of the mismatch, too little for its cause.")
         return Judged("unknown", [], p_value, notes)
-    if memory.correlated and memory.explained < _EXPLAINED:
+    if memory.correlated and memory.explained < EXPLAINED:
         notes.append(
             f"{labels} would explain {memory.explained:.0%} of it and of what is left, too little for its cause."
         )
@@ -84,6 +85,12 @@ def _gain_said(label: str, gain: Luck) -> str:
     worse = "the held-out runs worse"
     why = worse if gain.sound else "with numbers that physics does not admit or the runs do not tell"
     return f"{label} fitted the training runs better but {why}, and is not accepted."
+
+
+def by_fit(judged: Judged, share: float) -> Judged:
+    """The verdict on names that said too little by a linear picture, with the share of it that their fit explains."""
+    labels = ", ".join(one.effect.label for one in judged.named)
+    return dataclasses.replace(judged, notes=[*judged.notes, f"Fitted, {labels} explains {share:.0%} of it."])
 
 
 def standing_in(judged: Judged, effects: Sequence[AbstractEffect]) -> Judged:

@@ -21,10 +21,12 @@ class Memory(NamedTuple):
 
     - `p_value`: how probable they are to be so correlated over time by chance.
     - `explained`: the share that some effects have in what they explain and what the innovations' past would.
+    - `told`: how much χ² that past would explain.
     """
 
     p_value: float
     explained: float
+    told: float = 0.0
 
     @property
     def correlated(self) -> bool:
@@ -38,7 +40,7 @@ RANDOM = Memory(1.0, 1.0)
 def memory(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r k c"], gain: float) -> Memory:
     """Of innovations that are left beside effects which `gain` so much χ²."""
     told = remembered(white, measured)
-    return Memory(portmanteau(white, measured), max(gain, 0.0) / max(gain + told, 1e-300))
+    return Memory(portmanteau(white, measured), max(gain, 0.0) / max(gain + told, 1e-300), told)
 
 
 def record_sigma(error: Float[np.ndarray, "r k c"], mask: np.ndarray) -> Float[np.ndarray, " c"]:

@@ -21,7 +21,7 @@ from jaxsub.discrepancy.show import Luck
 from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, together
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
-from jaxsub.discrepancy.whiteness import RANDOM
+from jaxsub.discrepancy.whiteness import RANDOM, Memory
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.mechanisms import CoulombFriction
@@ -190,10 +190,10 @@ def test_of_several_those_that_no_fit_bears_out_are_left_out():
     assert together(Sets({0, 5}), [0, 1]) == {}
 
 
-def looked(naming, pattern=None):
-    """A look at recordings of which only what was named and the force without a name matter."""
+def looked(naming, pattern=None, memory=RANDOM):
+    """A look at recordings of which only what was named, the force without a name and what is left matter."""
     found = object.__new__(Found)
-    parts = {"naming": naming, "pattern": pattern, "memory": RANDOM, "view": None, "selector": None}
+    parts = {"naming": naming, "pattern": pattern, "memory": memory, "view": None, "selector": None}
     for name, value in parts.items():
         object.__setattr__(found, name, value)
     return found
@@ -291,6 +291,7 @@ def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monk
     path = sys.modules["jaxsub.discrepancy.explain"]
     monkeypatch.setattr(path, "tried", stand)
     monkeypatch.setattr(path, "examine", lambda *_: after)
+    monkeypatch.setattr(path, "evidence_of", lambda view: 0.0)
     trial = silent()
     found = after_all(trial, base, seen("roll", yaw, roll), unknown, None)
     assert asked == [[7]]
@@ -298,3 +299,35 @@ def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monk
     assert after_all(trial, base, seen("surge", yaw, roll), unknown, None) == (base, unknown, None)
     assert after_all(trial, base, seen(None, yaw, roll), unknown, None) == (base, unknown, None)
     assert asked == [[7]]
+
+
+@pytest.mark.parametrize(
+    ("share", "left", "stands"),
+    [
+        (0.7, Memory(0.4, 0.0, 60.0), True),
+        (0.7, Memory(1e-9, 0.0, 60.0), True),
+        (0.7, Memory(1e-9, 0.0, 500.0), False),
+        (0.4, RANDOM, None),
+    ],
+)
+def test_names_that_say_most_by_a_linear_picture_are_asked_by_their_fit(monkeypatch, share, left, stands):
+    """Claim: with 70 % they are fitted, and stand if the fit explains three quarters; with 40 % nothing is fitted."""
+    delay, scale = (Named(i, SensorScale("psi", 0.1 * i), 1.0, [], []) for i in (3, 7))
+    base, better = Model(None, None, None, ()), Model(None, None, None, (delay.effect,))
+    unknown, named = Judged("unknown", [], 1e-9, []), Judged("named", [delay], 1e-9, [])
+    asked, after = [], looked(SimpleNamespace(named=[]), None, left)
+
+    def stand(trial, base, found, chosen, judged):
+        asked.append(chosen)
+        return better, named
+
+    path = sys.modules["jaxsub.discrepancy.explain"]
+    monkeypatch.setattr(path, "tried", stand)
+    monkeypatch.setattr(path, "examine", lambda *_: after)
+    evidence = iter([500.0, 0.0])
+    monkeypatch.setattr(path, "evidence_of", lambda view: next(evidence))
+    first = looked(SimpleNamespace(named=[delay, scale]), None, Memory(1e-9, share, 900.0))
+    model, said, found = after_all(silent(), base, first, unknown, None)
+    assert asked == ([] if stands is None else [[3, 7]])
+    assert (model, found) == ((better, after) if stands else (base, None))
+    assert said.named == ([delay] if stands else [])
