@@ -48,7 +48,7 @@ def diagnose(
 
     Returns the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` is told
     what is being done. **Raises** `InputError` where the recordings lack a column, or the model does not run from the
-    vehicle file's values.
+    vehicle file's values or diverges along the recordings.
     """
     size = len(train)
     runs = batch(vehicle, [*train, *held])
@@ -58,7 +58,11 @@ def diagnose(
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
         raise InputError(vehicle.layout.name, "the model does not run from its starting values", remedy)
     progress("following the recordings")
-    found = examine(look(start, file=vehicle), vocabulary, progress)
+    view = look(start, file=vehicle)
+    if not view.finite:
+        remedy = "bound the coefficient that makes it unstable, or sample more often"
+        raise InputError(vehicle.layout.name, "the model diverges when it is led along the recordings", remedy)
+    found = examine(view, vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
     progress("free runs through what the fit did not see")

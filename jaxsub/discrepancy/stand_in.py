@@ -76,7 +76,8 @@ def _worth(model: Model, more: Model) -> bool:
     What hardly changes anything may do so without luck, and would then ask for a round of fits more.
     """
     gain = luck(model.shown, more.shown, True, freely=True)
-    return _helpful(gain) and gain.free < 1.0 - _LITTLE and float(more.fit.cost) < float(model.fit.cost)
+    better = gain.free < 1.0 - _LITTLE and float(more.fit.cost) < float(model.fit.cost)
+    return more.view.finite and _helpful(gain) and better
 
 
 def _helpful(gain: Luck) -> bool:
@@ -142,7 +143,7 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
         gain = luck(base.shown, more.shown, sound(more.fit, more.added), freely=False)
         freely = gain._replace(freely=True)
         gain = freely if _helpful(freely) and not gain.helps else gain
-        if gain.helps:
+        if gain.helps and more.view.finite:
             return more, helped(judged, less, gain)
         if gain.free > last:
             break

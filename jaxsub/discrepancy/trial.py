@@ -20,6 +20,7 @@ from .programs import make_room
 from .progress import Progress
 from .selector import SIGNIFICANCE, Selector
 from .show import HeldOut, Luck, hold, luck
+from .stiffness import substeps_for
 from .verdict import Judged, helped, settled
 from .view import View, look
 from .whiteness import Memory
@@ -84,12 +85,17 @@ class Trial:
         make_room()
         self.progress(f"fitting with {', '.join(effect.label for effect in effects)}")
         joined = join(model.view, model.fit, effects, self.file)
+        substeps = substeps_for(joined, model.view.path.start)
+        if substeps > joined.runs.substeps:
+            finer = dataclasses.replace(model.fit, runs=dataclasses.replace(model.fit.runs, substeps=substeps))
+            joined = join(model.view, finer, effects, self.file)
         view = look(joined, disturbance)
         return Model(joined, view, self.held_out(joined, view.disturbance), (*model.added, *effects))
 
     def held_out(self, fit: Fit, disturbance: Disturbance) -> HeldOut:
         """A fit's vehicle on them."""
-        return hold(fit.vehicle, self.runs, self.chosen, self.size, self.sigma, disturbance)
+        runs = dataclasses.replace(self.runs, substeps=fit.runs.substeps)
+        return hold(fit.vehicle, runs, self.chosen, self.size, self.sigma, disturbance)
 
 
 class Tries:

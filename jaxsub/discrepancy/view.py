@@ -110,6 +110,11 @@ class View:
     base: Columns
     prior: Float[Array, "p1 p1"]
 
+    @property
+    def finite(self) -> bool:
+        """Whether the model could be led along all of the recordings, or diverged on the way."""
+        return bool(np.all(np.isfinite(self.covariance)))
+
     def measured(self, channel: str) -> np.ndarray:
         """All samples that `channel` has in the recordings, SI."""
         column = self.vehicle.layout.channels.index(channel)

@@ -1,0 +1,56 @@
+"""Steps are as short as the forces of effects ask: fast damping is followed, slow damping costs nothing."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from rigs import driven, oscillator
+
+from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.stiffness import FINEST, fastest, substeps_for
+from jaxsub.discrepancy.view import look
+from jaxsub.effects import CubicStiffness, QuadraticDamping
+from jaxsub.estimate import fit
+from jaxsub.simulate import synthetic
+from jaxsub.simulate.synthetic import integrate
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    vehicle = oscillator()
+    runs = synthetic(vehicle, [driven(vehicle, 0.1 * np.arange(200), seed, amplitude=1.0) for seed in range(2)], seed=1)
+    return fit(vehicle, batch(vehicle, runs))
+
+
+def test_the_fastest_rate_is_that_of_the_steepest_sample(fitted):
+    """Claim: of D2 |v| v it is 2 |D2| times the largest speed over the inertia; a spring adds none."""
+    motion = look(fitted).path.start
+    vehicle = oscillator().with_effect(CubicStiffness("x", jnp.asarray(3.0)))
+    assert fastest(vehicle, motion) == 0.0
+    vehicle = vehicle.with_effect(QuadraticDamping("x", jnp.asarray(-5.0)))
+    inertia = float(vehicle.mass_matrix()[0, 0])
+    steepest = 2.0 * 5.0 * float(np.max(np.abs(motion.rates["x"]))) / inertia
+    assert fastest(vehicle, motion) == pytest.approx(steepest, rel=1e-3)
+
+
+def test_a_run_is_stepped_as_finely_as_its_damping_asks_and_no_finer(fitted):
+    """Claim: none for what is slow, enough for a rate of 55 1/s at 0.1 s, and never more than the most."""
+    motion = look(fitted).path.start
+    largest = float(np.max(np.abs(motion.rates["x"])))
+    of = lambda rate: dataclasses.replace(
+        fitted, vehicle=oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-rate / (2.0 * largest))))
+    )
+    inertia = float(oscillator().mass_matrix()[0, 0])
+    assert [substeps_for(of(inertia * rate), motion) for rate in (1.0, 20.0, 55.0, 1e4)] == [1, 1, 4, FINEST]
+
+
+def test_with_the_steps_that_it_asks_for_fast_damping_is_followed_to_the_noise():
+    """Claim: damping of 25 1/s leaves the noise at eight steps in 0.2 s; at one half as much more, or no number."""
+    truth = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-40.0)))
+    inputs = [driven(truth, 0.2 * np.arange(200), seed, amplitude=2.0) for seed in range(2)]
+    runs = batch(truth, synthetic(truth, inputs, seed=2, states=integrate))
+    wrong = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-30.0)))
+    one, eight = (max(fit(wrong, dataclasses.replace(runs, substeps=n)).rms.values()) for n in (1, 8))
+    assert eight < 1.1
+    assert not one < 1.5
