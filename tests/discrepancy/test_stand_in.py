@@ -59,19 +59,22 @@ def seen(selector, memory, pattern=None, disturbance=None):
 
 
 @pytest.mark.parametrize(
-    ("chance", "free", "cost", "left", "stands"),
+    ("chance", "free", "cost", "left", "known", "stands"),
     [
-        (0.01, 0.98, 0.9, 1e-9, True),
-        (0.5, 0.98, 0.9, 1e-9, False),
-        (0.01, 0.995, 0.9, 1e-9, False),
-        (0.01, 0.98, 1.1, 1e-9, False),
-        (0.01, 0.98, 0.9, 1.0, False),
+        (0.01, 0.98, 0.9, 1e-9, 1.0, True),
+        (0.5, 0.98, 0.9, 1e-9, 1.0, False),
+        (0.01, 0.995, 0.9, 1e-9, 1.0, False),
+        (0.01, 0.98, 1.1, 1e-9, 1.0, False),
+        (0.01, 0.98, 0.9, 1.0, 1.0, False),
+        (0.01, 0.98, 0.9, 1e-9, np.nan, False),
     ],
 )
-def test_a_description_joins_where_it_explains_some_of_what_is_left(monkeypatch, chance, free, cost, left, stands):
+def test_a_description_joins_where_it_explains_some_of_what_is_left(
+    monkeypatch, chance, free, cost, left, known, stands
+):
     """Claim: a drag of the wrong sign goes, the rest stands; not by luck, for half a per cent, or fitted worse.
 
-    Nor where nothing is left.
+    Nor where nothing is left, nor where the model diverges when it is led along the recordings.
     """
     surge, yaw = QuadraticDamping("surge", -1.0), CubicDamping("yaw", -1.0)
     shares = [(0.3, 0.2), (0.0, 0.2), (0.0, 0.0)]
@@ -81,7 +84,8 @@ def test_a_description_joins_where_it_explains_some_of_what_is_left(monkeypatch,
     admitted = lambda chosen, index: selector.usable[index]
     selector = Freely([surge, yaw], shares, admitted, named.view.disturbance)
     fit_of = dataclasses.replace(found, cost=cost * found.cost)
-    fitted = lambda trial, model, effects, disturbance: model._replace(fit=fit_of, added=(*model.added, *effects))
+    led = dataclasses.replace(named.view, covariance=known * named.view.covariance)
+    fitted = lambda trial, model, effects, _: model._replace(fit=fit_of, view=led, added=(*model.added, *effects))
     monkeypatch.setattr(Trial, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
     again = Freely([], [()], lambda *_: True)
