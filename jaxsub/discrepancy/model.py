@@ -17,20 +17,27 @@ from .view import View, by_cost
 _VANISHED = 1e-6
 
 
-def join(view: View, fit: Fit, effects: Sequence[AbstractEffect], file: AbstractVehicle) -> Fit:
+def join(
+    view: View,
+    fit: Fit,
+    effects: Sequence[AbstractEffect],
+    file: AbstractVehicle,
+    near: Sequence[AbstractVehicle] = (),
+) -> Fit:
     """The vehicle of `fit` with `effects` more, fitted again as it runs free: what it will be used for.
 
     The search begins at what innovations say of all numbers, and at the numbers of the `file`: those of a fit that had
     to do without the effects may lie where nothing leads back, such as a rudder that steers the other way. Where
-    neither is better than that fit, it begins from the effects' predicted sizes or a tenth of them. Numbers that are
-    not free in the fit stay as they are in it.
+    neither is better than that fit, it begins from the effects' predicted sizes or a tenth of them. It begins too at
+    vehicles with these effects that are `near` the answer. Numbers that are not free in the fit stay as they are in it.
     """
     listed = {effect.label for effect in file.effects}
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
     values = fit.vehicle.values()
     held = {row.name: values[row.name] for row in fit.vehicle.layout.parameters if not row.free}
     searched = lambda start: _searched(fit, start.with_values(held).holding(held))
-    fits = [searched(joined(view.vehicle, effects, 1.0)), searched(joined(file, [*earlier, *effects], 1.0))]
+    starts = [*near, joined(view.vehicle, effects, 1.0), joined(file, [*earlier, *effects], 1.0)]
+    fits = [searched(start) for start in starts]
     for share in (1.0, 0.1):
         if any(float(found.cost) < float(fit.cost) for found in fits):
             break

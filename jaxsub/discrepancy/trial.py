@@ -80,15 +80,24 @@ class Trial:
     progress: Progress
     file: AbstractVehicle
 
-    def with_effects(self, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance) -> Model:
-        """A model with `effects` more, fitted again and tried; the `disturbance` is where one may look for its own."""
+    def with_effects(
+        self,
+        model: Model,
+        effects: Sequence[AbstractEffect],
+        disturbance: Disturbance,
+        near: Sequence[AbstractVehicle] = (),
+    ) -> Model:
+        """A model with `effects` more, fitted again and tried; the `disturbance` is where one may look for its own.
+
+        The fit begins at vehicles with these effects that are `near` too.
+        """
         make_room()
         self.progress(f"fitting with {', '.join(effect.label for effect in effects)}")
-        joined = join(model.view, model.fit, effects, self.file)
+        joined = join(model.view, model.fit, effects, self.file, near)
         substeps = substeps_for(joined, model.view.path.start)
         if substeps > joined.runs.substeps:
             finer = dataclasses.replace(model.fit, runs=dataclasses.replace(model.fit.runs, substeps=substeps))
-            joined = join(model.view, finer, effects, self.file)
+            joined = join(model.view, finer, effects, self.file, near)
         view = look(joined, disturbance)
         return Model(joined, view, self.held_out(joined, view.disturbance), (*model.added, *effects))
 
@@ -118,8 +127,23 @@ class Tries:
         """The base with these."""
         key, disturbance = tuple(sorted(numbers)), self.found.naming.products.disturbance
         if key not in self.models:
-            self.models[key] = self.trial.with_effects(self.models[()], self.effects(key), disturbance)
+            near = self._near(key)
+            self.models[key] = self.trial.with_effects(self.models[()], self.effects(key), disturbance, near)
         return self.models[key]
+
+    def _near(self, key: tuple[int, ...]) -> list[AbstractVehicle]:
+        """The best vehicle with these and others, without the others: what is left out did little where it was fitted.
+
+        From the numbers of a model without them all, a fit of few may end far from where that of more did.
+        """
+        more = [other for other in self.models if set(other) > set(key) and key]
+        if not more:
+            return []
+        best = min(more, key=lambda other: float(self.models[other].fit.cost))
+        vehicle = self.models[best].fit.vehicle
+        for index in set(best) - set(key):
+            vehicle = vehicle.without_effect(self.found.selector.candidates[index].label)
+        return [vehicle]
 
     def sound(self, numbers: Sequence[int]) -> bool:
         """Whether they came out of the fit as physics admits, and the recordings tell each beside the others."""

@@ -1,5 +1,6 @@
 """What is taken first, what stands beside its twins, and what is said of those that a fit was asked of."""
 
+import functools
 import sys
 from types import SimpleNamespace
 
@@ -331,3 +332,19 @@ def test_names_that_say_most_by_a_linear_picture_are_asked_by_their_fit(monkeypa
     assert asked == ([] if stands is None else [[3, 7]])
     assert (model, found) == ((better, after) if stands else (base, None))
     assert said.named == ([delay] if stands else [])
+
+
+def test_a_fit_of_fewer_effects_begins_also_where_that_of_more_ended():
+    """Claim: at the best vehicle with all of them and others, less the others; at none where no fit had them all."""
+    drag, lift, scale = QuadraticDamping("sway", -1.0), CubicDamping("yaw", -1.0), SensorScale("psi", 0.1)
+    tries = object.__new__(Tries)
+    tries.found = looked(None)
+    object.__setattr__(tries.found, "selector", SimpleNamespace(candidates=[drag, lift, scale]))
+    of = lambda cost, *effects: SimpleNamespace(fit=SimpleNamespace(cost=cost, vehicle=with_all(effects)))
+    with_all = lambda effects: functools.reduce(lambda vehicle, effect: vehicle.with_effect(effect), effects, dsrv())
+    tries.models = {(): of(9.0), (0, 1): of(5.0, drag, lift), (0, 1, 2): of(2.0, drag, lift, scale)}
+    assert [[effect.label for effect in near.effects] for near in tries._near((0,))] == [[drag.label]]
+    assert tries._near((0,))[0].effects[0] is tries.models[0, 1, 2].fit.vehicle.effects[0]
+    assert [effect.label for effect in tries._near((1, 2))[0].effects] == [lift.label, scale.label]
+    assert tries._near((0, 1, 2)) == []
+    assert tries._near(()) == []
