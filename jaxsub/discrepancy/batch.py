@@ -7,7 +7,7 @@ import numpy as np
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
 from ..vehicle import AbstractVehicle
-from .stiffness import FINEST
+from .stiffness import substeps_of
 
 
 def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
@@ -17,7 +17,7 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     fastest = float(np.max(np.abs(np.linalg.eigvals(rates))))
     longest = max(float(np.diff(r.times).max()) for r in recordings)
     # linear damping is exact at any step; effects that replace it have the same rate and are not
-    substeps = int(np.clip(np.ceil(longest * fastest / 1.5), 1, FINEST))
+    substeps = substeps_of(longest * fastest)
     return stack_runs(
         recordings, held=layout.held, interpolated=layout.interpolated, channels=layout.channels, substeps=substeps
     )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect
+from ..effects import FORCE_UNITS, AbstractEffect
 from ..errors import InputError
 from ..estimate import Fit, fit
 from ..recording import Recording
@@ -32,8 +32,6 @@ from .view import View, look
 _RIVALS = 2
 # and how many a page lists: the rest are less likely still
 _SHOWN = 4
-# a mechanism's coordinate may be of any unit
-_FORCE_UNITS = {"surge": " N", "sway": " N", "heave": " N", "roll": " N m", "pitch": " N m", "yaw": " N m"}
 
 
 def diagnose(
@@ -190,8 +188,10 @@ def disturbance_note(view: View) -> list[str]:
     """One line: the forces that no model predicts, where they are larger than their own smallest visible size."""
     layout, disturbance = view.vehicle.layout, view.disturbance
     total = np.asarray(view.followed.force).std(axis=(0, 1))
+    # a mechanism's coordinate may be of any unit
+    sized = lambda e, q: f"{float(q):.3g} {FORCE_UNITS.get(e, '')}".strip()
     said = [
-        f"{e} ({float(q):.3g}{_FORCE_UNITS.get(e, '')}, {float(t):.2g} s)"
+        f"{e} ({sized(e, q)}, {float(t):.2g} s)"
         for e, q, t, rms in zip(layout.equations, disturbance.force, disturbance.time, total, strict=True)
         if rms > 0.3 * float(q)
     ]

@@ -18,7 +18,7 @@ from .show import luck
 from .trial import Found, Model, Trial, tried, worth_trying
 from .verdict import EXPLAINED, NOTHING, Judged, both, by_fit, idle, judge
 from .view import View, facts
-from .whiteness import RANDOM, Memory, memory
+from .whiteness import RANDOM, Memory, memory, share_of
 
 # times that others are asked where all that was named was refused
 _REFUSALS = 2
@@ -137,4 +137,4 @@ def after_all(
 def _explained(base: Model, best: Model, found: Found) -> float:
     """Of what a fit explains and of what the past tells beside it, as `found` from there, the fit's share."""
     gain = 2.0 * (evidence_of(best.view) - evidence_of(base.view))
-    return max(gain, 0.0) / max(gain + found.memory.told * found.memory.correlated, 1e-300)
+    return share_of(gain, found.memory.told if found.memory.correlated else 0.0)

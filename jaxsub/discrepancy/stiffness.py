@@ -48,4 +48,9 @@ def substeps_for(fit: Fit, motion: Motion) -> int:
     turned = float(np.max(np.asarray(fit.runs.steps))) * fastest(fit.vehicle, motion)
     if not turned > _TOO_MUCH * fit.runs.substeps:
         return fit.runs.substeps
-    return int(np.clip(np.ceil(turned / _FOLLOWED), fit.runs.substeps, FINEST))
+    return substeps_of(turned, fit.runs.substeps)
+
+
+def substeps_of(turned: float, least: int = 1) -> int:
+    """Steps in an interval that is `turned` times the fastest rate long."""
+    return int(np.clip(np.ceil(turned / _FOLLOWED), least, FINEST))

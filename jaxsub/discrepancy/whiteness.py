@@ -40,7 +40,12 @@ RANDOM = Memory(1.0, 1.0)
 def memory(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r k c"], gain: float) -> Memory:
     """Of innovations that are left beside effects which `gain` so much χ²."""
     told = remembered(white, measured)
-    return Memory(portmanteau(white, measured), max(gain, 0.0) / max(gain + told, 1e-300), told)
+    return Memory(portmanteau(white, measured), share_of(gain, told), told)
+
+
+def share_of(gain: float, told: float) -> float:
+    """Of what effects `gain` and what is `told` beside them, both χ², the effects' share."""
+    return max(gain, 0.0) / max(gain + told, 1e-300)
 
 
 def record_sigma(error: Float[np.ndarray, "r k c"], mask: np.ndarray) -> Float[np.ndarray, " c"]:

@@ -30,6 +30,7 @@ from .memory import AbstractMemory, FluidMemory, Hysteresis, with_memory
 from .motion import (
     CHANNEL_UNITS,
     EQUATIONS,
+    FORCE_UNITS,
     FORCES,
     GRAVITY,
     VELOCITIES,
@@ -51,6 +52,7 @@ __all__ = [
     "CHANNEL_UNITS",
     "EQUATIONS",
     "FORCES",
+    "FORCE_UNITS",
     "GRAVITY",
     "KNOTS",
     "VELOCITIES",

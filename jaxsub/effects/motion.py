@@ -10,6 +10,7 @@ Signal = Array | np.ndarray
 EQUATIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 VELOCITIES: dict[str, str] = dict(zip(EQUATIONS, "uvwpqr", strict=True))
 FORCES: dict[str, str] = dict(zip(EQUATIONS, "XYZKMN", strict=True))
+FORCE_UNITS: dict[str, str] = dict(zip(EQUATIONS, ["N"] * 3 + ["N m"] * 3, strict=True))
 GRAVITY = 9.80665
 PROPULSION = ("shaft_speed", "thrust")
 _CHANNELS = {

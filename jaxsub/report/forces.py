@@ -9,6 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from ..discrepancy.diagnosis import Diagnosis, ForceTrace, Location
+from ..effects import FORCE_UNITS
 from .drawing import (
     BASELINE,
     GREY,
@@ -27,12 +28,10 @@ from .drawing import (
 )
 from .text import symbol
 
-_UNITS: dict[str, str] = {"surge": "N", "sway": "N", "heave": "N", "roll": "N m", "pitch": "N m", "yaw": "N m"}
-
 
 def force_unit(equation: str) -> str:
     """N or N m; a mechanism's coordinate may be either, so its force is only `generalised`."""
-    return _UNITS.get(equation, "generalised force")
+    return FORCE_UNITS.get(equation, "generalised force")
 
 
 def is_equation(place: Location) -> bool:
