@@ -274,6 +274,19 @@ def test_what_alone_says_nearly_all_is_tried_first_and_alone():
     assert leading(Weighed({(3,): 40.0}), [3]) == [3]
 
 
+def fitted_to(monkeypatch, model, said, after, asked):
+    """Every trial ends at `model` with what is `said`, and a look there sees `after`; what was asked is kept."""
+
+    def stand(trial, base, found, chosen, judged):
+        asked.append(chosen)
+        return model, said
+
+    path = sys.modules["jaxsub.discrepancy.explain"]
+    monkeypatch.setattr(path, "tried", stand)
+    monkeypatch.setattr(path, "examine", lambda *_: after)
+    return path
+
+
 @pytest.mark.parametrize(("left_in", "stands"), [("roll", False), ("yaw", True), (None, True)])
 def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monkeypatch, left_in, stands):
     """Claim: a name that a force without one seemed to beat is tried, and stays if no such force is left there."""
@@ -285,13 +298,7 @@ def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monk
     unknown, named = Judged("unknown", [], 1e-9, []), Judged("named", [roll], 1e-9, [])
     asked, after = [], seen(left_in)
 
-    def stand(trial, base, found, chosen, judged):
-        asked.append(chosen)
-        return better, named
-
-    path = sys.modules["jaxsub.discrepancy.explain"]
-    monkeypatch.setattr(path, "tried", stand)
-    monkeypatch.setattr(path, "examine", lambda *_: after)
+    path = fitted_to(monkeypatch, better, named, after, asked)
     monkeypatch.setattr(path, "evidence_of", lambda view: 0.0)
     trial = silent()
     found = after_all(trial, base, seen("roll", yaw, roll), unknown, None)
@@ -318,13 +325,7 @@ def test_names_that_say_most_by_a_linear_picture_are_asked_by_their_fit(monkeypa
     unknown, named = Judged("unknown", [], 1e-9, []), Judged("named", [delay], 1e-9, [])
     asked, after = [], looked(SimpleNamespace(named=[]), None, left)
 
-    def stand(trial, base, found, chosen, judged):
-        asked.append(chosen)
-        return better, named
-
-    path = sys.modules["jaxsub.discrepancy.explain"]
-    monkeypatch.setattr(path, "tried", stand)
-    monkeypatch.setattr(path, "examine", lambda *_: after)
+    path = fitted_to(monkeypatch, better, named, after, asked)
     evidence = iter([500.0, 0.0])
     monkeypatch.setattr(path, "evidence_of", lambda view: next(evidence))
     first = looked(SimpleNamespace(named=[delay, scale]), None, Memory(1e-9, share, 900.0))
