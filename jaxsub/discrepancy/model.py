@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 
+import jax
 import numpy as np
 from scipy import special
 
@@ -15,6 +16,8 @@ from .view import View, by_cost
 
 # a shape such as a lag at which its effect is gone
 _VANISHED = 1e-6
+# of a column whose squares are zero in floating point
+_NO_COLUMN = 1e-100
 
 
 def join(
@@ -86,12 +89,15 @@ def p_value(view: View, effect: AbstractEffect) -> float:
     r"""How probable so large an `effect` of a view's vehicle is where there is none.
 
     By the Wald statistic $a^T P^{-1} a$ of its amplitudes, which then is $\chi^2$, or of the numbers of an effect that
-    has no amplitude.
+    has no amplitude. One that changes nothing, such as a limit that nothing reaches, is not told, however large it is.
     """
     names, values = [row.name for row in view.vehicle.layout.free], view.vehicle.values()
     symbols = effect.symbols()
     own = [f"{effect.label}.{symbols[name]}" for name in amplitudes(effect) or symbols]
     at = [names.index(name) for name in own]
+    columns = [np.asarray(part)[..., 1:][..., at] for part in jax.tree.leaves(view.base)]
+    if all(np.max(np.abs(part)) < _NO_COLUMN for part in columns):
+        return 1.0
     size = np.array([float(values[name]) for name in own])
     wald = size @ np.linalg.solve(view.covariance[np.ix_(at, at)], size)
     return float(special.chdtrc(len(at), max(float(wald), 0.0)))

@@ -23,6 +23,7 @@ from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading,
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM, Memory
+from jaxsub.effects.actuators import ActuatorRateLimit
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.mechanisms import CoulombFriction
@@ -107,6 +108,14 @@ def test_what_is_there_is_told_and_what_is_not_is_not():
     assert told(view, [scale])
     assert not told(view, [asymmetry])
     assert not told(view, [scale, asymmetry])
+
+
+@pytest.mark.parametrize("rate", [1e30, 1e261])
+def test_a_limit_that_nothing_reaches_is_not_told(rate):
+    """Claim: a rate limit far beyond all commands changes nothing, and so its size says nothing for it."""
+    limit = ActuatorRateLimit(dsrv().layout.inputs[0][0], rate)
+    runs = batch(wrong(), recorded(None, 1)[:2])
+    assert not told(look(fit(wrong().with_effect(limit), runs)), [limit])
 
 
 class Scanned(Selector):
