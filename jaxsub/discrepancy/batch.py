@@ -1,5 +1,6 @@
 """Recordings as the batch that a vehicle takes."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
 from ..vehicle import AbstractVehicle
-from .stiffness import substeps_of
+from .stiffness import substeps_free, substeps_of
 
 
 def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
@@ -18,6 +19,7 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     longest = max(float(np.diff(r.times).max()) for r in recordings)
     # linear damping is exact at any step; effects that replace it have the same rate and are not
     substeps = substeps_of(longest * fastest)
-    return stack_runs(
+    runs = stack_runs(
         recordings, held=layout.held, interpolated=layout.interpolated, channels=layout.channels, substeps=substeps
     )
+    return dataclasses.replace(runs, substeps=substeps_free(vehicle, runs))

@@ -7,11 +7,14 @@ Differential Equations II, ch. IV.2.
 
 import dataclasses
 
+import equinox as eqx
 import jax
 import numpy as np
 
 from ..effects import AbstractForce, AbstractMemory, Motion
-from ..estimate import Fit
+from ..estimate import initial_guess
+from ..recording.runs import Runs
+from ..simulate import Sampled
 from ..vehicle import AbstractVehicle
 
 FINEST = 16  # steps in a sample interval
@@ -23,10 +26,9 @@ _SMALL = 1e-4
 
 def fastest(vehicle: AbstractVehicle, motion: Motion) -> float:
     """The largest rate (1/s) at which the forces of effects without states answer velocities along a `motion`."""
-    effects = [e for e in vehicle.effects if isinstance(e, AbstractForce) and not isinstance(e, AbstractMemory)]
+    effects, equations = jax.tree.map(np.asarray, _at_once(vehicle)), vehicle.layout.equations
     if not effects:
         return 0.0
-    effects, equations = jax.tree.map(np.asarray, effects), vehicle.layout.equations
     still = np.zeros(np.shape(motion.rates[equations[0]]))
 
     def force(at: Motion) -> np.ndarray:
@@ -43,14 +45,49 @@ def fastest(vehicle: AbstractVehicle, motion: Motion) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(np.asarray(vehicle.mass_matrix()), slopes)))))
 
 
-def substeps_for(fit: Fit, motion: Motion) -> int:
-    """Integration steps in a sample interval of a fit's runs, as they are or as many as its effects need."""
-    turned = float(np.max(np.asarray(fit.runs.steps))) * fastest(fit.vehicle, motion)
-    if not turned > _TOO_MUCH * fit.runs.substeps:
-        return fit.runs.substeps
-    return substeps_of(turned, fit.runs.substeps)
+def substeps_for(vehicle: AbstractVehicle, runs: Runs, motion: Motion) -> int:
+    """Integration steps in a sample interval of `runs`, as they are or as many as effects need along a `motion`."""
+    turned = _turned(vehicle, runs, motion)
+    return substeps_of(turned, runs.substeps) if turned > _TOO_MUCH * runs.substeps else runs.substeps
+
+
+def substeps_free(vehicle: AbstractVehicle, runs: Runs) -> int:
+    """The same as the vehicle runs free; as `runs` are, where it diverges however fine its steps.
+
+    What is stepped too coarsely moves too slowly, or diverges: steps are shortened until they are as short as asked.
+    """
+    substeps = runs.substeps
+    while _at_once(vehicle) and substeps <= FINEST:
+        finer = dataclasses.replace(runs, substeps=substeps)
+        motion = _free(vehicle, finer, initial_guess(vehicle, runs)[0])
+        finite = all(np.all(np.isfinite(rate)) for rate in motion.rates.values())
+        if finite and substeps == runs.substeps:
+            asked = substeps_for(vehicle, runs, motion)
+        else:
+            asked = substeps_of(_turned(vehicle, runs, motion), substeps) if finite else 2 * substeps
+        if asked == substeps:
+            return substeps
+        substeps = asked
+    return runs.substeps
 
 
 def substeps_of(turned: float, least: int = 1) -> int:
     """Steps in an interval that is `turned` times the fastest rate long."""
     return int(np.clip(np.ceil(turned / _FOLLOWED), least, FINEST))
+
+
+def _turned(vehicle: AbstractVehicle, runs: Runs, motion: Motion) -> float:
+    """The longest sample interval times the fastest rate along a motion."""
+    return float(np.max(np.asarray(runs.steps))) * fastest(vehicle, motion)
+
+
+def _at_once(vehicle: AbstractVehicle) -> list[AbstractForce]:
+    """The forces of effects without states."""
+    return [e for e in vehicle.effects if isinstance(e, AbstractForce) and not isinstance(e, AbstractMemory)]
+
+
+@eqx.filter_jit
+def _free(vehicle: AbstractVehicle, runs: Runs, start: jax.Array) -> Motion:
+    """The motion at the samples but the last."""
+    states = Sampled.of(vehicle, runs).states(runs, start)
+    return vehicle.motion(states[:, :-1], jax.vmap(vehicle.actuate)(runs.times, runs.nodes())[:, :, 0])

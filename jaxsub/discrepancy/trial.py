@@ -94,7 +94,7 @@ class Trial:
         make_room()
         self.progress(f"fitting with {', '.join(effect.label for effect in effects)}")
         joined = join(model.view, model.fit, effects, self.file, near)
-        substeps = substeps_for(joined, model.view.path.start)
+        substeps = substeps_for(joined.vehicle, joined.runs, model.view.path.start)
         if substeps > joined.runs.substeps:
             finer = dataclasses.replace(model.fit, runs=dataclasses.replace(model.fit.runs, substeps=substeps))
             joined = join(model.view, finer, effects, self.file, near)

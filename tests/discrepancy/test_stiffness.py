@@ -11,7 +11,7 @@ from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.stiffness import FINEST, fastest, substeps_for
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import CubicStiffness, QuadraticDamping
-from jaxsub.estimate import fit
+from jaxsub.estimate import fit, initial_guess, predict
 from jaxsub.simulate import synthetic
 from jaxsub.simulate.synthetic import integrate
 
@@ -38,11 +38,10 @@ def test_a_run_is_stepped_as_finely_as_its_damping_asks_and_no_finer(fitted):
     """Claim: none for what is slow, enough for a rate of 55 1/s at 0.1 s, and never more than the most."""
     motion = look(fitted).path.start
     largest = float(np.max(np.abs(motion.rates["x"])))
-    of = lambda rate: dataclasses.replace(
-        fitted, vehicle=oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-rate / (2.0 * largest))))
-    )
     inertia = float(oscillator().mass_matrix()[0, 0])
-    assert [substeps_for(of(inertia * rate), motion) for rate in (1.0, 20.0, 55.0, 1e4)] == [1, 1, 4, FINEST]
+    damping = lambda rate: QuadraticDamping("x", jnp.asarray(-inertia * rate / (2.0 * largest)))
+    steps = [substeps_for(oscillator().with_effect(damping(r)), fitted.runs, motion) for r in (1.0, 20.0, 55.0, 1e4)]
+    assert steps == [1, 1, 4, FINEST]
 
 
 def test_with_the_steps_that_it_asks_for_fast_damping_is_followed_to_the_noise():
@@ -54,3 +53,15 @@ def test_with_the_steps_that_it_asks_for_fast_damping_is_followed_to_the_noise()
     one, eight = (max(fit(wrong, dataclasses.replace(runs, substeps=n)).rms.values()) for n in (1, 8))
     assert eight < 1.1
     assert not one < 1.5
+
+
+def test_a_file_with_fast_damping_is_simulated_as_finely_as_it_asks():
+    """Claim: damping of 25 1/s is simulated from its file as SciPy integrates it, and what diverges anyhow as it is."""
+    fast = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-40.0)))
+    given = driven(fast, 0.2 * np.arange(200), 0, amplitude=2.0)
+    runs = batch(fast, synthetic(fast, [given], seed=2, states=integrate, noise=False))
+    assert 1 < runs.substeps < FINEST
+    shown = predict(fast, runs, initial_guess(fast, runs)[0])
+    assert float(jnp.max(jnp.abs(shown - runs.outputs))) < 1e-2 * float(jnp.max(jnp.abs(runs.outputs)))
+    assert batch(oscillator(), [given]).substeps == 1
+    assert batch(oscillator().with_effect(QuadraticDamping("x", jnp.asarray(1e3))), [given]).substeps == 1
