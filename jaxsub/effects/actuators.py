@@ -17,7 +17,7 @@ from ..parameters import number
 from .base import AbstractActuator, shape
 from .motion import Facts
 
-_GRID = (0.5, 1.0, 2.0, 4.0, 8.0)
+_GRID = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 # of the largest command
 PARTS = (0.02, 0.05, 0.1, 0.2, 0.4)
 

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from samples import BODY
 from scipy.integrate import solve_ivp
 
 from jaxsub.effects import ActuatorDelay, ActuatorLag
@@ -55,6 +56,17 @@ def test_delay_keeps_the_impulse_of_a_command_that_ends_at_zero():
     found = ActuatorDelay("rudder", jnp.asarray(0.37)).respond(jnp.asarray(TIMES), quiet)
     dt = np.diff(TIMES)
     np.testing.assert_allclose(found[:, 0] @ dt, quiet[:, 0] @ dt, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "field"), [(ActuatorLag, "T"), (ActuatorDelay, "tau")])
+def test_candidates_lie_near_any_time_from_half_a_sample_to_32(kind, field):
+    """Claim: the nearest is never off by more than a factor of √2: a fit from a far one ends in another valley."""
+    known = BODY
+    tried = {
+        float(getattr(effect, field)) for effect in kind.candidates(known) if effect.actuator == known.actuators[0]
+    }
+    for time in known.sample_interval * np.geomspace(0.5, 32.0, 30):
+        assert min(abs(np.log(time / other)) for other in tried) <= 0.5 * np.log(2.0) + 1e-9, time
 
 
 @pytest.mark.parametrize("time", [1e-9, 1e-5, 1e-3, 0.05, 0.333, 5.0])
