@@ -44,6 +44,8 @@ _QUIET = 1e-2
 _LEAST_WHITE = 1e-5
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
+# times a number of the vehicle file, as far as it may be off where the file does not say
+_ABOUT = 10.0
 
 
 class Trajectory(eqx.Module):
@@ -132,8 +134,12 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     leads back. Nor are its initial states to be trusted, and a filter begins at what is known before the fit. And what
     is left is put down to forces at first, or to sensors: forces that follow a sensor which is wrong make the right
     ones wrong.
+
+    Numbers of the file are taken to be of the right order. Where recordings hardly tell them, such as without a
+    velocity log, numbers a hundred times too large can do what an actuator's force does, and nothing would be left to
+    name it by.
     """
-    problem, rms = fit.problem, fit.rms
+    problem, rms = _of_order(fit), fit.rms
     much = max(rms.values()) > _MUCH
     led = _Led(fit, problem, problem.guess if much else fit.start)
     system = System.of(fit.model, fit.runs, fit.sigma, problem.spread)
@@ -153,6 +159,15 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
     covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
     return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
+
+
+def _of_order(fit: Fit) -> Problem:
+    """The problem of a fit, with a wide prior about each number of the file that has none."""
+    problem, own = fit.problem, fit.vehicle.own_values()
+    width = _ABOUT * jnp.abs(problem.prior_mean)
+    given = jnp.array([row.name in own for row in fit.vehicle.layout.free], bool)
+    wide = given & (width > 0.0) & jnp.isinf(problem.prior_std)
+    return dataclasses.replace(problem, prior_std=jnp.where(wide, width, problem.prior_std))
 
 
 def by_cost(found: Iterable[_Costed]) -> list[_Costed]:

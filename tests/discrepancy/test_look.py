@@ -3,14 +3,18 @@
 import dataclasses
 import math
 
+import jax.numpy as jnp
+import numpy as np
 import pytest
 from diagnosis_cases import recorded, wrong
+from rigs import driven, oscillator
 
 from jaxsub.discrepancy import batch, view
 from jaxsub.discrepancy.evidence import evidence_of
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.estimate import fit
+from jaxsub.simulate import synthetic
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +68,15 @@ def test_turns_end_where_the_cost_stays_or_there_is_none(monkeypatch, costs, tur
 
     monkeypatch.setattr(view, "_turned", lambda led, one: at(one.__dict__["number"] + 1))
     assert view._settled(object.__new__(view._Led), at(0)).__dict__["number"] == turns
+
+
+def test_numbers_that_the_recordings_do_not_tell_are_of_the_order_of_the_files():
+    """Claim: undriven, the drive's gain stays where it was, to ten times it, or to the file's own spread."""
+    still = driven(oscillator(), 0.1 * np.arange(100), 0, amplitude=0.0)
+    start = jnp.asarray([[0.5, 0.0]])
+    for given, spread in ((2.0, 20.0), ({"value": 2.0, "prior_std": 0.3}, 0.3)):
+        vehicle = oscillator(coefficients={"D_x": 0.6, "K_x": 4.0, "B_x_drive": given})
+        led = look(fit(vehicle, batch(vehicle, synthetic(vehicle, [still], seed=3, start=start))))
+        at = [row.name for row in vehicle.layout.free].index("B_x_drive")
+        assert float(led.vehicle.values()["B_x_drive"]) == pytest.approx(2.0)
+        assert np.sqrt(led.covariance[at, at]) == pytest.approx(spread, rel=1e-3)
