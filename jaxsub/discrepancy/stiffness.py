@@ -7,15 +7,15 @@ Differential Equations II, ch. IV.2.
 
 import dataclasses
 
-import equinox as eqx
 import jax
 import numpy as np
 
 from ..effects import AbstractForce, AbstractMemory, Motion
 from ..estimate import initial_guess
 from ..recording.runs import Runs
-from ..simulate import Sampled
+from ..simulate import sampled_states
 from ..vehicle import AbstractVehicle
+from .view import Trajectory
 
 FINEST = 16  # steps in a sample interval
 # of a step times the fastest rate: beyond the one it is not followed, and with the other it is
@@ -45,10 +45,13 @@ def fastest(vehicle: AbstractVehicle, motion: Motion) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(np.asarray(vehicle.mass_matrix()), slopes)))))
 
 
-def substeps_for(vehicle: AbstractVehicle, runs: Runs, motion: Motion) -> int:
-    """Integration steps in a sample interval of `runs`, as they are or as many as effects need along a `motion`."""
-    turned = _turned(vehicle, runs, motion)
-    return substeps_of(turned, runs.substeps) if turned > _TOO_MUCH * runs.substeps else runs.substeps
+def substeps_for(vehicle: AbstractVehicle, runs: Runs, motion: Motion, most: float = _TOO_MUCH) -> int:
+    """Integration steps in a sample interval of `runs`, as they are or as many as effects need along a `motion`.
+
+    They stay while a step is no longer than `most` over the fastest rate.
+    """
+    turned = float(np.max(np.asarray(runs.steps))) * fastest(vehicle, motion)
+    return substeps_of(turned, runs.substeps) if turned > most * runs.substeps else runs.substeps
 
 
 def substeps_free(vehicle: AbstractVehicle, runs: Runs) -> int:
@@ -56,18 +59,17 @@ def substeps_free(vehicle: AbstractVehicle, runs: Runs) -> int:
 
     What is stepped too coarsely moves too slowly, or diverges: steps are shortened until they are as short as asked.
     """
-    substeps = runs.substeps
-    while _at_once(vehicle) and substeps <= FINEST:
-        finer = dataclasses.replace(runs, substeps=substeps)
-        motion = _free(vehicle, finer, initial_guess(vehicle, runs)[0])
-        finite = all(np.all(np.isfinite(rate)) for rate in motion.rates.values())
-        if finite and substeps == runs.substeps:
-            asked = substeps_for(vehicle, runs, motion)
-        else:
-            asked = substeps_of(_turned(vehicle, runs, motion), substeps) if finite else 2 * substeps
-        if asked == substeps:
-            return substeps
-        substeps = asked
+    if not _at_once(vehicle):
+        return runs.substeps
+    start, tried, most = initial_guess(vehicle, runs)[0], runs, _TOO_MUCH
+    while tried.substeps <= FINEST:
+        states = sampled_states(vehicle, tried, start)
+        asked = 2 * tried.substeps
+        if np.all(np.isfinite(states)):
+            asked = substeps_for(vehicle, tried, Trajectory.of(vehicle, tried, states, states).start, most)
+        if asked == tried.substeps:
+            return asked
+        tried, most = dataclasses.replace(tried, substeps=asked), _FOLLOWED
     return runs.substeps
 
 
@@ -76,18 +78,6 @@ def substeps_of(turned: float, least: int = 1) -> int:
     return int(np.clip(np.ceil(turned / _FOLLOWED), least, FINEST))
 
 
-def _turned(vehicle: AbstractVehicle, runs: Runs, motion: Motion) -> float:
-    """The longest sample interval times the fastest rate along a motion."""
-    return float(np.max(np.asarray(runs.steps))) * fastest(vehicle, motion)
-
-
 def _at_once(vehicle: AbstractVehicle) -> list[AbstractForce]:
     """The forces of effects without states."""
     return [e for e in vehicle.effects if isinstance(e, AbstractForce) and not isinstance(e, AbstractMemory)]
-
-
-@eqx.filter_jit
-def _free(vehicle: AbstractVehicle, runs: Runs, start: jax.Array) -> Motion:
-    """The motion at the samples but the last."""
-    states = Sampled.of(vehicle, runs).states(runs, start)
-    return vehicle.motion(states[:, :-1], jax.vmap(vehicle.actuate)(runs.times, runs.nodes())[:, :, 0])
