@@ -13,13 +13,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jax.custom_batching import sequential_vmap
 from jaxtyping import Array, Bool, Float
 
+from .curvature import over_unit_diagonal
 from .problem import Expansion
 
-# a direction with less of the curvature than this is rounding, and says nothing
-_FLAT = 1e-13
 _FIRST, _LEAST, _MOST = 1e-3, 1e-10, 1e12
 
 
@@ -56,14 +54,15 @@ class Damped(optx.AbstractMinimiser):
     def init(self, fn: Any, y: Array, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> _State:
         """Nothing is known yet; the start itself is tried first."""
         zero = jnp.zeros((), y.dtype)
-        at = Expansion(zero, jnp.zeros_like(y), jnp.zeros((y.size, y.size), y.dtype))
+        shapes = eqx.filter_eval_shape(self.expand, args, y)
+        at = jax.tree.map(lambda part: jnp.zeros(part.shape, part.dtype), shapes)
         return _State(jnp.asarray(True), at, y, zero + 1.0, zero + _FIRST, zero + 2.0, zero + jnp.inf)
 
     def step(self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any) -> tuple[Array, _State, None]:
         """Evaluate the trial, move there if it is better, and choose the next."""
         new = self.expand(args, state.trial)
         gain = (state.at.cost - new.cost) / state.promised
-        finite = jnp.isfinite(new.cost) & jnp.all(jnp.isfinite(new.hessian)) & jnp.all(jnp.isfinite(new.gradient))
+        finite = jnp.all(jnp.stack([jnp.all(jnp.isfinite(part)) for part in jax.tree.leaves(new)]))
         good = finite & (state.fresh | (gain > 0.0))
         chosen = lambda a, b: jnp.where(good, a, b)
         at = jax.tree.map(chosen, new, state.at)
@@ -93,26 +92,11 @@ class Damped(optx.AbstractMinimiser):
         return y, aux, {}
 
 
-@sequential_vmap
-def _eigh(matrix: Float[Array, "d d"]) -> tuple[Float[Array, " d"], Float[Array, "d d"]]:
-    """Eigenvalues and vectors, of a batch one after the other.
-
-    jaxlib 0.10 gives each worker of XLA's pool a part of a batch and waits on one of them for the others: two programs
-    at a time, a thread for each core, then wait for each other without end.
-    """
-    return tuple(jnp.linalg.eigh(matrix))
-
-
 def _step(at: Expansion, damping: Array, longest: float) -> tuple[Array, Array, Array]:
     """The step, what its quadratic model promises to gain, and what the full step would."""
-    diagonal = jnp.abs(jnp.diag(at.hessian))
-    size = jnp.where(diagonal > 0.0, jnp.sqrt(diagonal), 1.0)
-    values, vectors = _eigh(at.hessian / jnp.outer(size, size))
-    gradient = vectors.T @ (at.gradient / size)
-    move = -gradient / (jnp.abs(values) + damping)
-    move = move * jnp.minimum(1.0, longest / jnp.max(jnp.abs(vectors @ move / size)))
-    promised = -jnp.sum(move * (gradient + 0.5 * jnp.abs(values) * move))
-    told = jnp.abs(values) > _FLAT * jnp.max(jnp.abs(values), initial=0.0)
-    full = 0.5 * jnp.sum(jnp.where(told, gradient**2 / jnp.where(told, jnp.abs(values), 1.0), 0.0))
-    # where the curvature is not that of a minimum there is more to gain than a full step tells
-    return vectors @ move / size, promised, jnp.where(jnp.any(values < -1e-6), jnp.inf, full)
+    curvature, size = over_unit_diagonal(at.curvature)
+    gradient = at.gradient / size
+    move = -curvature.solve(gradient, damping)
+    move = move * jnp.minimum(1.0, longest / jnp.max(jnp.abs(move / size)))
+    promised = -jnp.sum(move * (gradient + 0.5 * curvature.times(move)))
+    return move / size, promised, curvature.gain(gradient)

@@ -17,6 +17,7 @@ from ..parameters import Transform
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import memory_states
+from .curvature import Arrow
 from .newton import second_order
 
 # how far an initial state that nothing measures may lie from rest: m/s, rad/s, rad, m
@@ -144,14 +145,12 @@ class Problem(eqx.Module):
         p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
         gram = self.products(y)
         prior, slopes = _value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
-        own = gram[:, p:-1, p:-1] + jnp.eye(s)
-        mixed = jnp.moveaxis(gram[:, :p, p:-1], 0, 1).reshape(p, len(y) - p)
         among = jnp.sum(gram[:, :p, :p], axis=0) + slopes.T @ slopes
-        hessian = jnp.block([[among, mixed], [mixed.T, jax.scipy.linalg.block_diag(*own)]]) if s else among
+        curvature = Arrow(among, gram[:, :p, p:-1], gram[:, p:-1, p:-1] + jnp.eye(s)) if s else among
         by_theta = jnp.sum(gram[:, :p, -1], axis=0) + slopes.T @ prior
         by_start = gram[:, p:-1, -1].ravel() + y[p:]
         cost = 0.5 * (jnp.sum(gram[:, -1, -1]) + jnp.sum(prior**2) + jnp.sum(y[p:] ** 2))
-        return Expansion(cost, jnp.concatenate([by_theta, by_start]), hessian)
+        return Expansion(cost, jnp.concatenate([by_theta, by_start]), curvature)
 
     def products(self, y: Float[Array, " d"]) -> Float[Array, "r q q"]:
         """Products of each run's whitened columns: by the parameters, by its own initial state, and the error.
@@ -179,11 +178,16 @@ class Problem(eqx.Module):
 
 
 class Expansion(eqx.Module):
-    """A cost to second order about a point: its value, gradient (d,) and curvature (d, d)."""
+    """A cost to second order about a point: its value, gradient (d,) and curvature (d, d), or the parts of that."""
 
     cost: Float[Array, ""]
     gradient: Float[Array, " d"]
-    hessian: Float[Array, "d d"]
+    curvature: Arrow | Float[Array, "d d"]
+
+    @property
+    def hessian(self) -> Float[Array, "d d"]:
+        """The curvature with all of its zeros."""
+        return self.curvature.dense() if isinstance(self.curvature, Arrow) else self.curvature
 
 
 def _value_and_columns(f: Callable[[Array], Array], at: Float[Array, " q"]) -> tuple[Array, Array]:
