@@ -7,13 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..filter.vehicle import unfilterable
 from ..likelihood import Linearised, concentrated_sigma, linearise, residual_outputs
 from ..recording.runs import Runs
 from ..results import RESULTS
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 from .method import AbstractMethod
-from .methods import gauss_newton
+from .methods import filtered_first, gauss_newton
 from .problem import Problem
 
 _CONCENTRATIONS = 12
@@ -151,13 +152,37 @@ def fit(
 ) -> Fit:
     """Fit the free numbers of `vehicle`, and an initial state for each run, to `runs`.
 
-    `method` is Gauss–Newton where none is given. `sigma` overrides the file's noise; `start` is where the initial
-    states' search begins, or with `known_start` what they are. A failure is a value in `Fit.result`, no exception.
+    `method` is Gauss–Newton where none is given; where that does not run or arrive, also from the end of a filter, and
+    the more probable is taken. A free run of an unstable model is soon lost, while a filter is held to what was
+    measured; the numbers that it comes to allow for what is missing. `sigma` overrides the file's noise; `start` is
+    where the initial states' search begins, or with `known_start` what they are. A failure is a value in `Fit.result`,
+    no exception.
     """
+    by = lambda method: _fitted(vehicle, runs, method, sigma, start, known_start)
+    found = by(method)
+    if method is None and not bool(found.result == RESULTS.successful) and not unfilterable(vehicle):
+        found = min(found, by(filtered_first()), key=_improbable)
+    return found
+
+
+def _fitted(
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    method: AbstractMethod | None,
+    sigma: Array | None,
+    start: Array | None,
+    known_start: bool,
+) -> Fit:
     fitted, states, noise, cost, steps, result = search(
         vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start
     )
     return evaluate(fitted, runs, states, noise, cost=cost, steps=steps, result=result, known_start=known_start)
+
+
+def _improbable(found: Fit) -> float:
+    """Minus the log likelihood, noise that was estimated included; infinite where the model did not run."""
+    value = float(found.cost + jnp.sum(found.runs.samples() * jnp.log(found.sigma)))
+    return value if np.isfinite(value) else np.inf
 
 
 def evaluate(

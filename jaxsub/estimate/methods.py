@@ -7,6 +7,7 @@ import optimistix as optx
 
 from ..filter.ekf import ExtendedKalmanFilter
 from ..filter.mekf import ModifiedKalmanFilter
+from .combined import Chain
 from .damped import Damped
 from .filtered import Filtered
 from .method import Iterative
@@ -49,6 +50,12 @@ def gradient(tolerance: float = 1e-9) -> Iterative:
 def mekf() -> Filtered:
     """The paper's modified extended Kalman filter with square roots."""
     return Filtered(ModifiedKalmanFilter)
+
+
+@functools.cache
+def filtered_first() -> Chain:
+    """The paper's modified filter, and Gauss–Newton from where it ends."""
+    return Chain(mekf(), gauss_newton())
 
 
 @functools.cache

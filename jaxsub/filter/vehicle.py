@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..effects import AbstractActuator, AbstractSensor
+from ..effects import AbstractActuator, AbstractEffect, AbstractSensor
 from ..errors import InputError
 from ..parameters import Transform
 from ..recording.runs import Runs
@@ -29,6 +29,12 @@ class Drive(eqx.Module):
     signals: Float[Array, "*k m"]
 
 
+def unfilterable(vehicle: AbstractVehicle) -> list[AbstractEffect]:
+    """Effects on actuators and delays of sensors, whose memory is no part of the state that a filter follows."""
+    late = lambda effect: isinstance(effect, AbstractSensor) and effect.remembers
+    return [effect for effect in vehicle.effects if isinstance(effect, AbstractActuator) or late(effect)]
+
+
 class VehicleProcess(AbstractProcess):
     r"""The sampled step of a vehicle and what its sensors show, $\theta$ the free parameters by `transform`.
 
@@ -37,7 +43,7 @@ class VehicleProcess(AbstractProcess):
     - `vehicle`: what is not free. `transform`: between its free parameters and $\theta$.
     - `substeps`: steps in each sample interval.
 
-    **Raises** `InputError` for an effect on an actuator, and a sensor's delay: their memory is no part of the state.
+    **Raises** `InputError` for effects that are `unfilterable`.
     """
 
     vehicle: AbstractVehicle
@@ -45,10 +51,9 @@ class VehicleProcess(AbstractProcess):
     substeps: int = eqx.field(static=True, default=1)
 
     def __check_init__(self):
-        for effect in self.vehicle.effects:
-            if isinstance(effect, AbstractActuator) or (isinstance(effect, AbstractSensor) and effect.remembers):
-                remedy = "filter without it, or fit by the output error"
-                raise InputError(self.vehicle.layout.name, f"a filter cannot hold the memory of {effect.label}", remedy)
+        for effect in unfilterable(self.vehicle):
+            remedy = "filter without it, or fit by the output error"
+            raise InputError(self.vehicle.layout.name, f"a filter cannot hold the memory of {effect.label}", remedy)
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, substeps: int = 1) -> "VehicleProcess":

@@ -10,10 +10,10 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 
 from jaxsub.effects import KNOTS, SmoothForce
-from jaxsub.estimate import Problem, fit, initial_guess, search
+from jaxsub.estimate import Problem, fit, gauss_newton, initial_guess, search
 from jaxsub.results import RESULTS
 from jaxsub.simulate import simulate, synthetic
-from jaxsub.vehicle.catalogue import dsrv
+from jaxsub.vehicle.catalogue import dsrv, remus_100
 
 NAMES = ("D_x", "K_x", "B_x_drive")
 TRUTH = {"D_x": 0.6, "K_x": 4.0, "B_x_drive": 2.0}
@@ -84,6 +84,20 @@ def test_optimum_is_that_of_scipy_on_an_exact_model(found):
     np.testing.assert_allclose([found.values[name] for name in NAMES], best.x[:3], rtol=1e-5)
     np.testing.assert_allclose(found.covariance, covariance, rtol=1e-3)
     np.testing.assert_allclose(found.cost, best.cost, rtol=1e-5)
+
+
+def test_file_whose_model_is_unstable_is_fitted_as_if_it_ran():
+    """Claim: from REMUS as published, whose free run is lost in seconds, the fit ends where one from the truth ends."""
+    file = remus_100()
+    damped = {"Y_v": -200.0, "N_r": -18.0, "Z_w": -80.0, "M_q": -10.0, "N_v": -20.0, "M_w": 20.0}
+    truth = file.with_values({name: jnp.asarray(value) for name, value in damped.items()})
+    runs = dataclasses.replace(recorded(truth, 2, 150, 0.2, 1), substeps=2)
+    assert bool(fit(file, runs, method=gauss_newton()).result == RESULTS.nan_start)
+    reached, expected = fit(file, runs), fit(truth, runs)
+    assert bool(reached.result == RESULTS.successful)
+    np.testing.assert_allclose(reached.cost, expected.cost, rtol=1e-6)
+    for name, value in damped.items():
+        assert abs(reached.values[name] - value) < 4.0 * reached.standard_errors[name]
 
 
 def test_start_that_does_not_run_is_a_result_and_no_exception(found):
