@@ -67,7 +67,8 @@ def explained(
 
     Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
     they leave is not random: far from the truth a linear picture shows the largest alone. Where the held-out runs
-    refuse all that was named and the mismatch is beyond doubt, the rest of the vocabulary is asked.
+    refuse all that was named and the mismatch is beyond doubt, the rest of the vocabulary is asked; and where they
+    refuse all that free runs ask for, what the next sample asks for.
     """
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
@@ -84,7 +85,7 @@ def explained(
         if chosen and said.named:
             best, judged = without_idle(trial, baseline, best, judged, older)
             dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
-        if chosen and said.verdict == "unknown" and refusals < _REFUSALS:
+        if chosen and not said.named and _others(found.selector, said, refusals):
             refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
         if after is None and not said.named:
             return best, judged, found
@@ -92,6 +93,18 @@ def explained(
         if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
             return best, judged, None
         found = after or examine(best.view, vocabulary, trial.progress)
+
+
+def _others(selector: Selector, said: Judged, refusals: int) -> bool:
+    """Whether others are to be asked once all that was named was refused; at last, where free runs asked, without them.
+
+    Free runs that err for many causes at once ask for what does what all of these do.
+    """
+    if said.verdict == "unknown" and refusals < _REFUSALS:
+        return True
+    asked = bool(selector.freely)
+    selector.lose_free_run()
+    return asked
 
 
 def without_idle(

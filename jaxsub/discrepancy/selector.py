@@ -67,6 +67,7 @@ class Selector:
         still = Disturbance(_STILL * own.force, own.time, jnp.ones_like(own.noise))
         self.free = evidence.under(still)
         self.freely: set[int] = set()
+        self.lost = False
         forms = collections.Counter(effect.name for effect in self.candidates)
         # every name is as probable as any other before the data, and within a name every form
         self.prior = -np.log([looked_at.get(effect.name, forms[effect.name]) for effect in self.candidates])
@@ -132,6 +133,11 @@ class Selector:
         size = self.free.gains(self.columns(chosen), [own]).amplitudes[0]
         return predict(self.candidates[index], size / self.evidence.length[own])
 
+    def lose_free_run(self) -> None:
+        """Ask no free run any more: what it asked for was refused, and errors that grew so long have other causes."""
+        self.lost = True
+        self.freely.clear()
+
     def foremost(self, chosen: Sequence[int], scan: Scan) -> int:
         """Which candidate to take next: the most probable, unless a free run asks for another and hardly for it.
 
@@ -139,7 +145,7 @@ class Selector:
         """
         best = int(np.argmax(scan.value))
         share = self.of_free_run(chosen)
-        if share[best] > _LITTLE:
+        if self.lost or share[best] > _LITTLE:
             return best
         asked = self._asked(chosen, scan) & (share > _MORE)
         if not np.any(asked):
@@ -160,7 +166,7 @@ class Selector:
         """
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
         share = self.of_free_run([])
-        if not self.free.gram[0, 0] > _LARGE * noise * self.free.samples:
+        if self.lost or not self.free.gram[0, 0] > _LARGE * noise * self.free.samples:
             return np.zeros_like(share)
         return np.where((share > _MUCH) & self._asked([], self.scan([])), share, 0.0)
 

@@ -219,8 +219,9 @@ def silent():
 class Asked:
     """Looks at recordings of which the answers are given, each a refusal or what stands; what was asked is counted."""
 
-    def __init__(self, monkeypatch, *answers):
-        self.answers, self.tried = [*answers], 0
+    def __init__(self, monkeypatch, *answers, freely=()):
+        self.answers, self.tried, self.selector = [*answers], 0, object.__new__(Selector)
+        self.selector.freely, self.selector.lost = {*freely}, False
         path = sys.modules["jaxsub.discrepancy.explain"]
         fakes = {
             "judge": lambda *_: Judged("named", [], 1e-9, []),
@@ -233,7 +234,9 @@ class Asked:
         self.explained = path.explained
 
     def found(self):
-        return looked(SimpleNamespace(named=[0], again=False))
+        found = looked(SimpleNamespace(named=[0], again=False))
+        object.__setattr__(found, "selector", self.selector)
+        return found
 
     def try_one(self, trial, best, found, chosen, judged):
         self.tried += 1
@@ -256,6 +259,19 @@ def test_others_are_asked_where_all_that_was_named_is_refused(monkeypatch):
     asked = Asked(monkeypatch, *[refused] * 5)
     answer, left = asked.answer()
     assert (answer.verdict, asked.tried, left) == ("unknown", 3, True)
+
+
+def test_what_comes_next_is_asked_where_all_that_free_runs_asked_for_is_refused(monkeypatch):
+    """Claim: once, beyond doubt or not; where no free run asked, a second refusal that may be luck is the last word."""
+    refusals = [Judged("unknown", [], 1e-9, ["refused"]), Judged("none", [], 1e-3, ["refused too"])]
+    drag = Named(0, QuadraticDamping("x", -0.5), 1.0, [], [])
+    asked = Asked(monkeypatch, *refusals, Judged("named", [drag], 1e-9, ["stands"]), freely=[0])
+    answer, _ = asked.answer()
+    assert (answer.verdict, answer.named, asked.tried, asked.selector.lost) == ("named", [drag], 3, True)
+    asked = Asked(monkeypatch, *refusals, refusals[1], refusals[0], freely=[0])
+    assert (asked.answer()[0].verdict, asked.tried) == ("unknown", 3)
+    asked = Asked(monkeypatch, *refusals, Judged("named", [drag], 1e-9, ["stands"]))
+    assert (asked.answer()[0].verdict, asked.tried) == ("unknown", 2)
 
 
 def test_what_is_beyond_doubt_stays_unknown_where_the_rest_says_nothing(monkeypatch):
