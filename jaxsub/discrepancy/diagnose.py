@@ -12,9 +12,11 @@ from ..recording import Recording
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .advice import next_manoeuvre
+from .ahead import in_pieces
 from .batch import batch
 from .diagnosis import Candidate, Diagnosis, Gain, Location, Physics, Rival
-from .explain import examine, explained
+from .examine import examine
+from .explain import explained
 from .kinds import leading, missing, right
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
@@ -68,6 +70,8 @@ def diagnose(
     baseline = Model(start, found.view, trial.held_out(start, found.view.disturbance), ())
     named, judged, left = explained(trial, baseline, found, vocabulary)
     best, judged = (named, judged) if left is None else described(trial, named, left, judged, vocabulary)
+    if best.shown.pieces > 1:
+        baseline = in_pieces(trial, baseline, best.shown.pieces)
     return _told(vehicle, train, held, found, field, baseline, named, best, judged)
 
 

@@ -2,62 +2,22 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from ..effects import AbstractEffect, candidates, looked_at
-from ..likelihood import whitened
-from .columns import candidate_columns
-from .evidence import Evidence, evidence_of
-from .generic import pattern
+from ..effects import AbstractEffect
+from ..results import RESULTS
+from .evidence import evidence_of
+from .examine import examine, weighed
+from .many import by_what_comes_next
 from .model import sound, told
-from .name import MOST_EFFECTS, Naming, name
-from .programs import make_room
-from .progress import Progress
-from .selector import Selector
+from .name import MOST_EFFECTS
 from .show import luck
 from .trial import Found, Model, Trial, tried, worth_trying
 from .verdict import EXPLAINED, NOTHING, Judged, both, by_fit, idle, judge
-from .view import View, facts
-from .whiteness import RANDOM, Memory, memory, share_of
+from .whiteness import share_of
 
 # times that others are asked where all that was named was refused
 _REFUSALS = 2
 # of what names explain and what they leave is told by its own past, the share from which their fit is asked
 _MOST = 0.5
-
-
-def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
-    """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
-    return weighed(view, listed(view, vocabulary), progress)
-
-
-def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None) -> Selector:
-    """All that the recordings of a view may ask for and that its vehicle does not have."""
-    make_room()
-    present = {effect.label for effect in view.vehicle.effects}
-    known = facts(view)
-    absent = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
-    columns, owners = candidate_columns(view, absent)
-    return Selector(Evidence.of(view, columns), absent, owners, looked_at(known, vocabulary))
-
-
-def weighed(view: View, selector: Selector, progress: Progress) -> Found:
-    """What the candidates of a selector that are usable say, and a force without a name beside them."""
-    naming, evidence = name(selector, progress), selector.evidence
-    if naming.again:
-        return Found(view, selector, naming, None, RANDOM)
-    progress("looking for forces without a name")
-    bare = evidence.best([])[1]
-    under = [naming.products] if naming.products is bare else [bare, naming.products]
-    return Found(view, selector, naming, pattern(view, evidence, naming.columns, under), _memory(evidence, naming))
-
-
-def _memory(evidence: Evidence, naming: Naming) -> Memory:
-    """Whether what the named leave is random."""
-    products, system = naming.products, evidence.view.followed.system
-    white, _ = whitened(products.disturbance, system, evidence.left(naming.columns, products))
-    gain = 2.0 * (naming.value - evidence.best([])[0])
-    return memory(np.asarray(white)[..., 0], np.asarray(system.measured), gain)
 
 
 def explained(
@@ -66,12 +26,17 @@ def explained(
     """The model with what can be named, what is to be said, and the last look at what is left, if anything may be.
 
     Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
-    they leave is not random: far from the truth a linear picture shows the largest alone. Where the held-out runs
-    refuse all that was named and the mismatch is beyond doubt, the rest of the vocabulary is asked; and where they
-    refuse all that free runs ask for, what the next sample asks for.
+    they leave is not random: far from the truth a linear picture shows the largest alone. Where the baseline does not
+    run free, and where the held-out runs refuse all that was named, what comes next is asked, once; and where the
+    mismatch is then beyond doubt still, the rest of the vocabulary.
     """
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
+    # a free run that cannot be fitted asks for nothing
+    told_ahead = bool(baseline.fit.result != RESULTS.successful)
+    ahead = by_what_comes_next(trial, baseline, vocabulary) if told_ahead else None
+    if ahead is not None:
+        return *ahead, None
     while True:
         said, after = judge(found.naming, found.pattern, found.memory), None
         chosen = worth_trying(found, said)
@@ -85,26 +50,19 @@ def explained(
         if chosen and said.named:
             best, judged = without_idle(trial, baseline, best, judged, older)
             dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
-        if chosen and not said.named and _others(found.selector, said, refusals):
-            refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
+        if chosen and not said.named:
+            ahead = None if told_ahead else by_what_comes_next(trial, best, vocabulary)
+            if ahead is not None:
+                return ahead[0], both(judged, ahead[1]), None
+            told_ahead = True
+            if said.verdict == "unknown" and refusals < _REFUSALS:
+                refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
         if after is None and not said.named:
             return best, judged, found
         whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.remains)
         if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
             return best, judged, None
         found = after or examine(best.view, vocabulary, trial.progress)
-
-
-def _others(selector: Selector, said: Judged, refusals: int) -> bool:
-    """Whether others are to be asked once all that was named was refused; at last, where free runs asked, without them.
-
-    Free runs that err for many causes at once ask for what does what all of these do.
-    """
-    if said.verdict == "unknown" and refusals < _REFUSALS:
-        return True
-    asked = bool(selector.freely)
-    selector.lose_free_run()
-    return asked
 
 
 def without_idle(

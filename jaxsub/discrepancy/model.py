@@ -38,7 +38,7 @@ def join(
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
     values = fit.vehicle.values()
     held = {row.name: values[row.name] for row in fit.vehicle.layout.parameters if not row.free}
-    searched = lambda start: _searched(fit, start.with_values(held).holding(held))
+    searched = lambda start: freed(fit, start.with_values(held).holding(held))
     starts = [*near, joined(view.vehicle, effects, 1.0), joined(file, [*earlier, *effects], 1.0)]
     fits = [searched(start) for start in starts]
     for share in (1.0, 0.1):
@@ -48,7 +48,7 @@ def join(
     return by_cost(fits)[0]
 
 
-def _searched(fit: Fit, start: AbstractVehicle) -> Fit:
+def freed(fit: Fit, start: AbstractVehicle) -> Fit:
     """The fit of `start` to the runs of a fit."""
     vehicle, states, sigma, cost, steps, result = search(start, fit.runs, sigma=fit.sigma)
     return evaluate(vehicle, fit.runs, states, sigma, cost=cost, steps=steps, result=result)

@@ -1,7 +1,7 @@
 """What the improvement is worth on runs that the fit never saw, and what the recordings are worth."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import Fit, channel_rms, initial_guess, output_errors, predict, search
-from ..likelihood import Disturbance, Followed, follow, whitened
+from ..estimate import Fit, channel_rms, initial_guess, predict, search
+from ..likelihood import Disturbance, Followed, follow, residual_outputs, whitened
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
@@ -35,7 +35,7 @@ class HeldOut:
 
     `predicted` and `error` are lists of (K, c) arrays in SI, a run each; `rms` is rms(error)/σ by channel.
     `expected` are (K,) log likelihoods of each sample given those before it, a run each; `squares` (K,) the squared
-    errors/σ of each, a run each.
+    errors/σ of each, a run each. Each run is begun anew in each of its `pieces`.
     """
 
     predicted: list[np.ndarray]
@@ -43,28 +43,76 @@ class HeldOut:
     rms: dict[str, float]
     expected: list[np.ndarray]
     squares: list[np.ndarray]
+    pieces: int = 1
 
 
 def hold(
-    vehicle: AbstractVehicle, runs: Runs, chosen: Sequence[int], size: int, sigma: Array, disturbance: Disturbance
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    chosen: Sequence[int],
+    size: int,
+    sigma: Array,
+    disturbance: Disturbance,
+    pieces: int = 1,
 ) -> HeldOut:
-    """`vehicle` on the runs numbered `chosen`, in batches of `size`, the size of the training batch."""
+    """`vehicle` on the runs numbered `chosen`, in batches of `size`, the size of the training batch.
+
+    In several `pieces` each free run is begun anew at each of them, from the state that a filter has there.
+    """
     predicted, errors, expected = [], [], []
-    for first in range(0, len(chosen), size):
-        batch = list(chosen[first : first + size])
-        taken = runs.take(batch, size)
-        _, start, *_ = search(vehicle, taken, sigma=sigma, moving=False)
-        predicted += list(np.asarray(predict(vehicle, taken, start))[: len(batch)])
-        errors += list(np.asarray(output_errors(vehicle, taken, start))[: len(batch)])
-        spread = initial_guess(vehicle, taken)[1]
+    for count, taken in _batches(runs, chosen, size):
+        start, spread = initial_guess(vehicle, taken)
+        if pieces == 1:
+            _, start, *_ = search(vehicle, taken, sigma=sigma, moving=False)
         followed = follow(vehicle, taken, sigma, disturbance, start, spread)
-        expected += list(np.asarray(_probable(disturbance, followed))[: len(batch)])
+        shown = predict(vehicle, taken, start) if pieces == 1 else begun_anew(vehicle, followed, taken, pieces)
+        predicted += list(np.asarray(shown)[:count])
+        errors += list(np.asarray(residual_outputs(vehicle, taken, shown))[:count])
+        expected += list(np.asarray(_probable(disturbance, followed))[:count])
     whitened_error = np.stack(errors) / np.asarray(sigma)
     rms = channel_rms(jnp.asarray(whitened_error), runs.take(list(chosen), len(chosen)), vehicle.layout.channels)
     squares = np.sum(whitened_error**2, axis=-1)
-    # where a run diverges nothing is expected and everything wrong
-    expected = [np.where(np.isnan(run), -np.inf, run) for run in expected]
-    return HeldOut(predicted, errors, rms, expected, list(np.where(np.isnan(squares), np.inf, squares)))
+    squares = list(np.where(np.isnan(squares), np.inf, squares))
+    return HeldOut(predicted, errors, rms, _possible(expected), squares, pieces)
+
+
+def expects(
+    vehicle: AbstractVehicle, runs: Runs, chosen: Sequence[int], size: int, sigma: Array, disturbance: Disturbance
+) -> list[np.ndarray]:
+    """`HeldOut.expected` of `hold` alone, from initial states of which only the first samples tell."""
+    found = []
+    for count, taken in _batches(runs, chosen, size):
+        followed = follow(vehicle, taken, sigma, disturbance, *initial_guess(vehicle, taken))
+        found += list(np.asarray(_probable(disturbance, followed))[:count])
+    return _possible(found)
+
+
+def begun_anew(vehicle: AbstractVehicle, followed: Followed, runs: Runs, pieces: int) -> Float[Array, "r k c"]:
+    """Outputs of free runs through `pieces` of each run, each from the filtered state at its first sample."""
+    cut, first = runs.segments(pieces), starts(followed, pieces)
+    shown = predict(vehicle, cut, first).reshape(len(runs.times), pieces, *cut.outputs.shape[1:])
+    inner = shown[:, :, :-1].reshape(len(runs.times), -1, shown.shape[-1])
+    return jnp.concatenate([inner, shown[:, -1, -1:]], axis=1)[:, : runs.times.shape[1]]
+
+
+def starts(followed: Followed, pieces: int) -> Float[Array, "rp s"]:
+    """The filtered states where the pieces of runs begin, as `Runs.segments` lists them."""
+    samples = followed.filtered.shape[1]
+    length = -(-(samples - 1) // pieces)
+    first = np.minimum(length * np.arange(pieces), samples - 1)
+    return followed.filtered[:, first].reshape(-1, followed.filtered.shape[-1])
+
+
+def _batches(runs: Runs, chosen: Sequence[int], size: int) -> Iterator[tuple[int, Runs]]:
+    """Runs filled up to `size`, and how many of them count."""
+    for first in range(0, len(chosen), size):
+        batch = list(chosen[first : first + size])
+        yield len(batch), runs.take(batch, size)
+
+
+def _possible(expected: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Where a run diverges nothing is expected."""
+    return [np.where(np.isnan(run), -np.inf, run) for run in expected]
 
 
 @eqx.filter_jit

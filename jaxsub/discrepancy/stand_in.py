@@ -14,7 +14,7 @@ import numpy as np
 
 from ..effects import AbstractEffect, AbstractInstrument, parameter_table
 from ..likelihood import Disturbance
-from .explain import listed, weighed
+from .examine import listed, weighed
 from .model import allowing_for, sound
 from .selector import Selector
 from .show import Luck, luck

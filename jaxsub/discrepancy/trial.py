@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Array
@@ -15,7 +15,7 @@ from ..vehicle import AbstractVehicle
 from .evidence import evidence_of
 from .generic import Pattern, most_explained
 from .model import join, p_value, sound, told
-from .name import Naming, named_on, refitted, standing
+from .name import Named, Naming, named_on, refitted, standing
 from .programs import make_room
 from .progress import Progress
 from .selector import SIGNIFICANCE, Selector
@@ -101,10 +101,28 @@ class Trial:
         view = look(joined, disturbance)
         return Model(joined, view, self.held_out(joined, view.disturbance), (*model.added, *effects))
 
-    def held_out(self, fit: Fit, disturbance: Disturbance) -> HeldOut:
-        """A fit's vehicle on them."""
-        runs = dataclasses.replace(self.runs, substeps=fit.runs.substeps)
-        return hold(fit.vehicle, runs, self.chosen, self.size, self.sigma, disturbance)
+    def held_out(self, fit: Fit, disturbance: Disturbance, pieces: int = 1) -> HeldOut:
+        """A fit's vehicle on them, each cut into `pieces`."""
+        return hold(fit.vehicle, self.all_runs(fit), self.chosen, self.size, self.sigma, disturbance, pieces)
+
+    def all_runs(self, fit: Fit) -> Runs:
+        """The runs with the steps of a fit."""
+        return dataclasses.replace(self.runs, substeps=fit.runs.substeps)
+
+
+@runtime_checkable
+class Makes(Protocol):
+    """What makes a model with some effects more of another, by its own rules."""
+
+    def with_effects(
+        self,
+        model: Model,
+        effects: Sequence[AbstractEffect],
+        disturbance: Disturbance,
+        near: Sequence[AbstractVehicle] = (),
+    ) -> Model:
+        """As `Trial.with_effects`."""
+        ...
 
 
 class Tries:
@@ -113,7 +131,7 @@ class Tries:
     `freely` says whether it was a free run that asked for them, which then judges them.
     """
 
-    def __init__(self, trial: Trial, base: Model, found: Found, freely: bool):
+    def __init__(self, trial: Makes, base: Model, found: Found, freely: bool):
         self.trial, self.found, self.freely = trial, found, freely
         self.models: dict[tuple[int, ...], Model] = {(): base}
         self.said: dict[int, Luck] = {}
@@ -180,26 +198,33 @@ class Tries:
 def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
     """As many of `chosen` as stand together, each as the best of its twins; nothing if none do.
 
-    With one of two alone the coefficients take up the other, so all are fitted first, and what no fit bears out or the
-    held-out runs do not ask for is left out: what is left out wrongly is found again from a model with the others.
+    What the held-out runs do not ask for is left out: what is left out wrongly is found again from a model with the
+    others.
     """
     while chosen:
-        unsound = tries.unsound(chosen)
-        if unsound:
-            # of two that trade with each other neither is told, and one may be there
-            chosen = [i for i in chosen if i not in unsound] or [i for i in chosen if i != unsound[0]]
-            continue
-        kept: dict[int, Fits] = {}
-        for place, index in enumerate(chosen):
-            fits = tries.closest([*kept, *chosen[place + 1 :]], index)
-            kept[fits[0][0]] = fits
-        if not tries.gain([], [*kept]).helps:
+        kept = borne_out(tries, chosen)
+        if not kept or not tries.gain([], [*kept]).helps:
             return {}
         idle = next((i for i in reversed([*kept]) if not tries.helps([j for j in kept if j != i], i)), None)
         if idle is None:
             return kept
         chosen = [i for i in kept if i != idle]
     return {}
+
+
+def borne_out(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
+    """As many of `chosen` as their fit together bears out, each as the best of its twins.
+
+    With one of two alone the coefficients take up the other, so all are fitted first.
+    """
+    while unsound := tries.unsound(chosen) if chosen else []:
+        # of two that trade with each other neither is told, and one may be there
+        chosen = [i for i in chosen if i not in unsound] or [i for i in chosen if i != unsound[0]]
+    kept: dict[int, Fits] = {}
+    for place, index in enumerate(chosen):
+        fits = tries.closest([*kept, *chosen[place + 1 :]], index)
+        kept[fits[0][0]] = fits
+    return kept
 
 
 def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
@@ -226,7 +251,7 @@ def leading(selector: Selector, chosen: Sequence[int]) -> list[int]:
     return [best] if gains[best] > _NEARLY_ALL * (selector.value(chosen) - before) else []
 
 
-def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
+def tried(trial: Makes, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
     """The model with those of `chosen` that stand on the held-out runs, and what is then to be said.
 
     The one that leads, or all together, or else the best that stands alone: where the model errs much, a linear
@@ -248,9 +273,14 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
         found.selector.usable[[effect.label in fallen for effect in effects]] = False
     # a twin stands where a free run asked for the other, and so beside the same rivals
     found.selector.freely.update(kept if freely else ())
-    named = standing(found.selector, [*kept], refused)
-    stand = [refitted(one, [(effects[i], value) for i, value in kept[one.number]]) for one in named]
-    return tries.model([*kept]), settled(judged, stand)
+    return tries.model([*kept]), settled(judged, refitted_all(tries, kept, refused))
+
+
+def refitted_all(tries: Tries, kept: dict[int, Fits], refused: Sequence[int]) -> list[Named]:
+    """What was kept with the probabilities of it and its twins by the log evidence of fits, what was refused apart."""
+    selector = tries.found.selector
+    named = standing(selector, [*kept], refused)
+    return [refitted(one, [(selector.candidates[i], value) for i, value in kept[one.number]]) for one in named]
 
 
 def worth_trying(found: Found, judged: Judged) -> list[int]:

@@ -10,7 +10,7 @@ from .name import Named, Naming
 from .show import Luck
 from .whiteness import Memory
 
-_CERTAIN = 0.9
+CERTAIN = 0.9
 # of a mismatch, the share that its cause explains
 EXPLAINED = 0.75
 # log evidence by which a force without a name must beat the names to stand instead of them
@@ -100,6 +100,14 @@ def standing_in(judged: Judged, effects: Sequence[AbstractEffect]) -> Judged:
     return dataclasses.replace(judged, notes=[*judged.notes, note])
 
 
+def by_all(judged: Judged, pieces: int) -> Judged:
+    """The verdict on many effects found by what comes next, which free runs bear out, each run cut into `pieces`."""
+    note = "Free runs through the held-out runs, which alone asked for something else, err less with all of these."
+    if pieces > 1:
+        note += f" The model does not run free for long: free runs are begun anew in each of {pieces} parts of a run."
+    return dataclasses.replace(judged, notes=[*judged.notes, note])
+
+
 def idle(judged: Judged, label: str, others: Sequence[str]) -> Judged:
     """The verdict less an effect that is not asked for any more beside `others`."""
     named = [one for one in judged.named if one.effect.label != label]
@@ -120,7 +128,7 @@ def settled(judged: Judged, stand: list[Named]) -> Judged:
 
 
 def _certainty(named: Sequence[Named]) -> Verdict:
-    return "named" if all(one.probability >= _CERTAIN for one in named) else "ambiguous"
+    return "named" if all(one.probability >= CERTAIN for one in named) else "ambiguous"
 
 
 def summary(verdict: Verdict, physics: list[Physics], where: list[Location], standing: Sequence[AbstractEffect]) -> str:

@@ -139,9 +139,9 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     velocity log, numbers a hundred times too large can do what an actuator's force does, and nothing would be left to
     name it by.
     """
-    problem, rms = _of_order(fit), fit.rms
+    problem, rms = _of_order(fit.problem), fit.rms
     much = max(rms.values()) > _MUCH
-    led = _Led(fit, problem, problem.guess if much else fit.start)
+    led = _Led(problem, problem.guess if much else fit.start)
     system = System.of(fit.model, fit.runs, fit.sigma, problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
@@ -155,17 +155,24 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     while len(searches) > 1:
         searches = _apart(_turned(led, at) for at in searches)
         searches = searches[: max(1, len(searches) // 2)]
-    at = _settled(led, searches[0])
-    path = Trajectory.of(at.vehicle, fit.runs, at.followed.expected, at.followed.filtered)
-    covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
-    return View(at.vehicle, covariance, fit.runs, fit.sigma, at.followed, at.disturbance, path, at.base, at.prior)
+    return led.view(_settled(led, searches[0]))
 
 
-def _of_order(fit: Fit) -> Problem:
-    """The problem of a fit, with a wide prior about each number of the file that has none."""
-    problem, own = fit.problem, fit.vehicle.own_values()
+def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: Iterable[Disturbance]) -> View:
+    """The view of a vehicle, its free numbers moved from where they are to where innovations are least.
+
+    One search, from the best of some disturbances: of numbers that came of innovations already, but for a few.
+    """
+    problem = _of_order(Problem.of(vehicle, runs, sigma))
+    led = _Led(problem, problem.guess)
+    return led.view(_settled(led, by_cost(led.at(vehicle, one) for one in disturbances)[0]))
+
+
+def _of_order(problem: Problem) -> Problem:
+    """A problem with a wide prior about each number of the file that has none."""
+    vehicle, own = problem.vehicle, problem.vehicle.own_values()
     width = _ABOUT * jnp.abs(problem.prior_mean)
-    given = jnp.array([row.name in own for row in fit.vehicle.layout.free], bool)
+    given = jnp.array([row.name in own for row in vehicle.layout.free], bool)
     wide = given & (width > 0.0) & jnp.isinf(problem.prior_std)
     return dataclasses.replace(problem, prior_std=jnp.where(wide, width, problem.prior_std))
 
@@ -256,24 +263,23 @@ class _At:
 
 @dataclasses.dataclass(frozen=True)
 class _Led:
-    """A fit's recordings, by which vehicles with other numbers are led from initial states of mean `start`."""
+    """The recordings of a problem, by which vehicles with other numbers are led from initial states of mean `start`."""
 
-    fit: Fit
     problem: Problem
     start: Array
 
     def at(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> _At:
         """With the residual's and the parameters' columns in units in which each of the latter is of length one."""
-        fit, problem = self.fit, self.problem
-        followed = follow(vehicle, fit.runs, fit.sigma, disturbance, self.start, problem.spread)
+        problem, names = self.problem, [row.name for row in vehicle.layout.free]
+        followed = follow(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.spread)
         columns = followed.residual + followed.theta
-        known = len(fit.names) + 1
+        known = len(names) + 1
         found, spread = products(disturbance, followed.system, columns, jnp.zeros((known, known)))
         squares = jnp.diag(found)[1:]
         length = jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
         unit = jnp.concatenate([jnp.ones(1), length])
         values = vehicle.values()
-        away = problem.prior_mean - jnp.asarray([float(values[name]) for name in fit.names])
+        away = problem.prior_mean - jnp.asarray([float(values[name]) for name in names])
         pulled = jnp.column_stack([away, jnp.diag(1.0 / length)]) / problem.prior_std[:, None]
         untold = jnp.full(known, _UNTOLD).at[0].set(0.0)
         prior = pulled.T @ pulled + jnp.diag(untold)
@@ -294,6 +300,13 @@ class _Led:
             if trial.as_they_are < at.as_they_are:
                 return trial
         return at
+
+    def view(self, at: _At) -> View:
+        """What is seen from there."""
+        runs, sigma = self.problem.runs, self.problem.sigma
+        path = Trajectory.of(at.vehicle, runs, at.followed.expected, at.followed.filtered)
+        covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
+        return View(at.vehicle, covariance, runs, sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
 @eqx.filter_jit

@@ -1,0 +1,150 @@
+"""Models by innovations alone: of a vehicle that does not run free for long, or that lacks many things at once.
+
+Where the vehicle is unstable, as most are that an autopilot steers, a free run is lost within seconds whatever the
+model. A filter is held to what was measured, and numbers by its innovations come near the truth one effect after the
+other. What is found so is believed if in the end free runs through the held-out runs, begun anew as often as the model
+needs it, err less with all of it.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..effects import AbstractEffect, amplitudes
+from ..estimate import evaluate, initial_guess
+from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
+from ..results import RESULTS
+from ..vehicle import AbstractVehicle
+from .evidence import evidence_of
+from .model import freed, joined, sound, told
+from .programs import make_room
+from .show import Luck, begun_anew, expects, luck, starts
+from .stiffness import substeps_for
+from .trial import Model, Trial
+from .view import View, led_from, look
+
+# the most pieces into which a run is cut, the fewest samples of one, and of what was measured, the share of variance
+# that a free run may leave
+_PIECES, _FEWEST, _LEFT = 64, 8, 0.5
+# of a number without which an effect would be none
+_AS_NOTHING = 1e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class Ahead:
+    """Models with the numbers that innovations have, tried by what comes next on the held-out runs of a trial.
+
+    The free runs of what they show are those of the model that they were begun from.
+    """
+
+    trial: Trial
+
+    def begin(self, model: Model) -> Model:
+        """A model with its view's numbers."""
+        return self._model(model, model.view, ())
+
+    def with_effects(
+        self,
+        model: Model,
+        effects: Sequence[AbstractEffect],
+        disturbance: Disturbance,
+        near: Sequence[AbstractVehicle] = (),
+    ) -> Model:
+        """A model with `effects` more, its numbers moved from where they are, or from the first that are `near`."""
+        make_room()
+        self.trial.progress(f"following with {', '.join(effect.label for effect in effects)}")
+        vehicle = near[0] if near else joined(model.view.vehicle, effects, 1.0)
+        runs = model.view.runs
+        finer = max(runs.substeps, substeps_for(vehicle, runs, model.view.path.start))
+        runs, disturbances = dataclasses.replace(runs, substeps=finer), (disturbance, model.view.disturbance)
+        view = led_from(vehicle, runs, model.view.sigma, disturbances)
+        return self._model(model, view, effects)
+
+    def instead(self, start: Model, best: Model, effect: AbstractEffect, rival: AbstractEffect) -> Model:
+        """The `best` model, begun from `start`, with a `rival` in the place of an effect."""
+        vehicle = best.view.vehicle.without_effect(effect.label).with_effect(rival)
+        others = {one.label for one in best.added[len(start.added) :]} - {effect.label} | {rival.label}
+        effects = [one for one in vehicle.effects if one.label in others]
+        return self.with_effects(start, effects, best.view.disturbance, [vehicle])
+
+    def without(self, best: Model, effect: AbstractEffect) -> Luck:
+        """What the held-out runs gain by one of a model's effects.
+
+        Without it the other numbers are where innovations would have them by a linear picture, which is close: beside
+        it they are told, and no program is made for a vehicle that has one effect less.
+        """
+        trial, view = self.trial, best.view
+        vehicle = less(view, effect)
+        runs = trial.all_runs(best.fit)
+        expected = expects(vehicle, runs, trial.chosen, trial.size, trial.sigma, view.disturbance)
+        return luck(dataclasses.replace(best.shown, expected=expected), best.shown, True, freely=False)
+
+    def _model(self, model: Model, view: View, effects: Sequence[AbstractEffect]) -> Model:
+        trial, start = self.trial, initial_guess(view.vehicle, view.runs)[0]
+        ended = {"cost": jnp.asarray(-evidence_of(view)), "steps": jnp.asarray(0), "result": RESULTS.successful}
+        fit = evaluate(view.vehicle, view.runs, start, view.sigma, **ended)
+        runs = trial.all_runs(fit)
+        expected = expects(view.vehicle, runs, trial.chosen, trial.size, trial.sigma, view.disturbance)
+        shown = dataclasses.replace(model.shown, expected=expected)
+        return Model(fit, view, shown, (*model.added, *effects))
+
+
+def less(view: View, effect: AbstractEffect) -> AbstractVehicle:
+    r"""A view's vehicle with as good as nothing of one effect, $\theta - P_{\cdot a} P_{aa}^{-1} (a - a_0)$."""
+    rows, values, symbols = view.vehicle.layout.free, view.vehicle.values(), effect.symbols()
+    names = [row.name for row in rows]
+    own = [f"{effect.label}.{symbols[name]}" for name in amplitudes(effect) or symbols]
+    at = [names.index(name) for name in own]
+    here = np.array([float(values[name]) for name in names])
+    # a lag or the like that is zero is another kind of thing
+    gone = (0.0 if amplitudes(effect) else _AS_NOTHING) * here[at]
+    moved = here - view.covariance[:, at] @ np.linalg.solve(view.covariance[np.ix_(at, at)], here[at] - gone)
+    moved = np.clip(moved, [row.lower for row in rows], [row.upper for row in rows])
+    moved[at] = gone
+    return view.vehicle.with_values({name: jnp.asarray(value) for name, value in zip(names, moved, strict=True)})
+
+
+def proved(trial: Trial, base: Model, best: Model) -> Model | None:
+    """The `best` model of innovations as free runs show it, if those through the held-out runs err less than `base`'s.
+
+    Fitted to free runs if it runs free through the training runs, else begun anew as often as it has to be: to where a
+    free run of an unstable vehicle is lost a search finds numbers that suit it no more than others.
+    """
+    trial.progress(f"free runs with {', '.join(effect.label for effect in best.added)}")
+    pieces = pieces_of(best.view)
+    if pieces is None:
+        return None
+    before, after = base, best
+    if pieces > 1:
+        before, after = (in_pieces(trial, model, pieces) for model in (base, best))
+    else:
+        fit = freed(best.fit, best.view.vehicle)
+        view = look(fit, best.view.disturbance)
+        after = Model(fit, view, trial.held_out(fit, view.disturbance), best.added)
+    stands = sound(after.fit, after.added) and told(after.view, after.added)
+    return after if luck(before.shown, after.shown, stands, freely=True).helps else None
+
+
+def pieces_of(view: View) -> int | None:
+    """Into how few pieces its recordings are cut, if any, that free runs through each leave little of the motion."""
+    runs, measured = view.runs, [view.measured(channel) for channel in view.vehicle.layout.channels]
+    variance = np.array([np.var(values) if len(values) else np.inf for values in measured])
+    pieces = 1
+    while pieces <= min(_PIECES, runs.times.shape[1] // _FEWEST):
+        shown = begun_anew(view.vehicle, view.followed, runs, pieces)
+        rms = concentrated_sigma(residual_outputs(view.vehicle, runs, shown), runs)
+        if np.all(np.asarray(rms**2 - view.sigma**2) < _LEFT * variance):
+            return pieces
+        pieces *= 2
+    return None
+
+
+def in_pieces(trial: Trial, model: Model, pieces: int) -> Model:
+    """A model with its view's numbers, whose free runs are begun anew in every piece from what its filter says."""
+    view = model.view
+    ended = {"cost": model.fit.cost, "steps": model.fit.steps, "result": RESULTS.successful}
+    start = starts(view.followed, pieces)
+    fit = evaluate(view.vehicle, view.runs.segments(pieces), start, view.sigma, **ended)
+    return Model(fit, view, trial.held_out(fit, view.disturbance, pieces), model.added)

@@ -1,0 +1,50 @@
+"""What the vocabulary, and a force without a name, say about the recordings of one view."""
+
+import numpy as np
+
+from ..effects import AbstractEffect, candidates, looked_at
+from ..likelihood import whitened
+from .columns import candidate_columns
+from .evidence import Evidence
+from .generic import pattern
+from .name import Naming, name
+from .programs import make_room
+from .progress import Progress
+from .selector import Selector
+from .trial import Found
+from .view import View, facts
+from .whiteness import RANDOM, Memory, memory
+
+
+def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
+    """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
+    return weighed(view, listed(view, vocabulary), progress)
+
+
+def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None) -> Selector:
+    """All that the recordings of a view may ask for and that its vehicle does not have."""
+    make_room()
+    present = {effect.label for effect in view.vehicle.effects}
+    known = facts(view)
+    absent = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
+    columns, owners = candidate_columns(view, absent)
+    return Selector(Evidence.of(view, columns), absent, owners, looked_at(known, vocabulary))
+
+
+def weighed(view: View, selector: Selector, progress: Progress) -> Found:
+    """What the candidates of a selector that are usable say, and a force without a name beside them."""
+    naming, evidence = name(selector, progress), selector.evidence
+    if naming.again:
+        return Found(view, selector, naming, None, RANDOM)
+    progress("looking for forces without a name")
+    bare = evidence.best([])[1]
+    under = [naming.products] if naming.products is bare else [bare, naming.products]
+    return Found(view, selector, naming, pattern(view, evidence, naming.columns, under), _memory(evidence, naming))
+
+
+def _memory(evidence: Evidence, naming: Naming) -> Memory:
+    """Whether what the named leave is random."""
+    products, system = naming.products, evidence.view.followed.system
+    white, _ = whitened(products.disturbance, system, evidence.left(naming.columns, products))
+    gain = 2.0 * (naming.value - evidence.best([])[0])
+    return memory(np.asarray(white)[..., 0], np.asarray(system.measured), gain)

@@ -1,0 +1,100 @@
+"""Many effects that are missing at once, one look after the other, by what comes next.
+
+A free run that errs for many causes asks for what does what all of these do. So innovations are asked what is missing
+and how large it is, until they ask for nothing more that predicts the held-out runs; and free runs then judge it all.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..effects import AbstractEffect
+from .ahead import Ahead, proved
+from .examine import listed, weighed
+from .model import sound, told
+from .name import Named, refitted
+from .trial import Fits, Model, Trial, Tries, borne_out, refitted_all, worth_trying
+from .verdict import CERTAIN, NOTHING, Judged, both, by_all, helped, judge, settled
+
+# effects beyond which no more are sought
+_MANY = 16
+# rivals of what is not certain, tried in its place once all others are there
+_ANEW = 2
+
+
+def by_what_comes_next(
+    trial: Trial, base: Model, vocabulary: tuple[type[AbstractEffect], ...] | None
+) -> tuple[Model, Judged] | None:
+    """The model with what the next sample asks for, and what is to be said, if free runs through the held-out runs bear
+    it out.
+    """
+    ahead = Ahead(trial)
+    start = best = ahead.begin(base)
+    named: list[Named] = []
+    judged = NOTHING
+    while len(best.added) < _MANY:
+        selector = listed(best.view, vocabulary)
+        selector.lose_free_run()
+        found = weighed(best.view, selector, trial.progress)
+        said = judge(found.naming, found.pattern, found.memory)
+        chosen = worth_trying(found, said)
+        tries = Tries(ahead, best, found, False)
+        kept = _standing(tries, chosen)
+        if not kept:
+            break
+        named += refitted_all(tries, kept, ())
+        best, judged = tries.model([*kept]), both(judged, dataclasses.replace(said, named=[], notes=[]))
+    best, named = _asked_again(ahead, start, best, named)
+    best, judged = _asked_for(ahead, start, best, named, judged)
+    whole = proved(trial, base, best) if judged.named else None
+    return None if whole is None else (whole, by_all(judged, whole.shown.pieces))
+
+
+def _standing(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
+    """Those of `chosen` that stand on the held-out runs, if their fit bears them all out; else the first of them alone
+    where that is more probable.
+
+    What is chosen first does most, and of what is so large a linear picture sees other things in its place.
+    """
+    best: dict[int, Fits] = {}
+    for some in (chosen, chosen[:1]):
+        kept = borne_out(tries, some)
+        if kept and tries.gain([], [*kept]).helps and (not best or tries.value([*kept]) > tries.value([*best])):
+            best = kept
+        if len(kept) == len(chosen):
+            break
+    return best
+
+
+def _asked_again(ahead: Ahead, start: Model, best: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
+    """The model with a rival in the place of what is not certain, where that is more probable beside all others."""
+    said = []
+    for one in named:
+        models = [(one.effect, best)]
+        if one.probability < CERTAIN:
+            models += [(rival, ahead.instead(start, best, one.effect, rival)) for rival, _ in one.rivals[:_ANEW]]
+        models = [(effect, model) for effect, model in models if sound(model.fit, model.added)] or models[:1]
+        values = [(effect, -float(model.fit.cost)) for effect, model in models]
+        place = int(np.argmax([value for _, value in values]))
+        best = models[place][1]
+        said.append(refitted(dataclasses.replace(one, effect=models[place][0]), values))
+    return best, said
+
+
+def _asked_for(ahead: Ahead, start: Model, best: Model, named: Sequence[Named], judged: Judged) -> tuple[Model, Judged]:
+    """The model with those of `named` that the held-out runs ask for beside the others, and what is to be said."""
+    while named:
+        gains = {one.effect.label: ahead.without(best, one.effect) for one in named}
+        worst = min(gains, key=lambda label: (gains[label].helps, gains[label].likelihood))
+        if gains[worst].helps and told(best.view, best.added):
+            judged = settled(judged, list(named))
+            for one in named:
+                judged = helped(judged, one.effect, gains[one.effect.label])
+            return best, judged
+        named = [one for one in named if one.effect.label != worst]
+        labels = {one.effect.label for one in named}
+        fewer = [effect for effect in best.view.vehicle.effects if effect.label in labels]
+        near = best.view.vehicle.without_effect(worst)
+        best = ahead.with_effects(start, fewer, best.view.disturbance, [near])
+    return start, NOTHING
