@@ -7,7 +7,7 @@ import pytest
 from diagnosis_cases import disturbed, recorded, wrong
 
 from jaxsub.discrepancy import batch
-from jaxsub.discrepancy.explain import examine, listed
+from jaxsub.discrepancy.examine import examine, listed
 from jaxsub.discrepancy.kinds import leading, missing, right
 from jaxsub.discrepancy.model import join
 from jaxsub.discrepancy.name import Named
