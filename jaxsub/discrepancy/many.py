@@ -72,9 +72,12 @@ def _asked_again(ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
     said = []
     for one in named:
         models = [(one.effect, best)]
+        there = {effect.label for effect in best.added}
+        rivals = [rival for rival, _ in one.rivals[:_ANEW] if rival.label not in there]
         if one.probability < CERTAIN:
-            models += [(rival, ahead.instead(start, best, one.effect, rival)) for rival, _ in one.rivals[:_ANEW]]
-        models = [(effect, model) for effect, model in models if sound(model.fit, model.added)] or models[:1]
+            models += [(rival, ahead.instead(start, best, one.effect, rival)) for rival in rivals]
+        stands = lambda model: sound(model.fit, model.added) and told(model.view, model.added)
+        models = [(effect, model) for effect, model in models if stands(model)] or models[:1]
         values = [(effect, -float(model.fit.cost)) for effect, model in models]
         place = int(np.argmax([value for _, value in values]))
         best = models[place][1]

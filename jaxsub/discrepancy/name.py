@@ -27,7 +27,7 @@ _OFF, _FAR_OFF, _TWINS = 0.03, 0.3, 2
 # and between effects that act in the same place: where a motion is no larger than its noise, a picture along it gives
 # the square of a rate too much and its cube too little
 _SAME_PLACE = 0.5
-# of its χ², what a twin has left at most once the other is in the model
+# of its χ², what a rival has left at most once the other is in the model
 _ASKED_STILL = 0.5
 
 
@@ -145,6 +145,12 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     scan = selector.scan(others)
     out = {selector.candidates[i].name for i in refused} - {selector.candidates[index].name}
     may = selector.stand_in(others, index) & np.array([effect.name not in out for effect in selector.candidates])
+    # where many are missing another may do as much and be no rival: with the one in the model it is asked for still
+    if index not in selector.freely:
+        beside = selector.scan([*others, index])
+        asked = np.array([selector.p_value(i, beside) < SIGNIFICANCE for i in range(len(may))])
+        may &= ~(asked & (beside.statistic > _ASKED_STILL * scan.statistic))
+    may[index] = True
     log = np.where(may, scan.value, -np.inf)
     weights = np.exp(log - np.max(log))
     weights /= np.sum(weights)
@@ -165,10 +171,7 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     far = lambda j: _SAME_PLACE if scan.effects[j].where == place else off
     # a free run may ask for what is less probable sample by sample than a rival, which then is tried before it
     alike = lambda j: scan.statistic[j] > (1.0 - far(j)) * scan.statistic[index] or log[j] > log[index]
-    # where many are missing another may do as much and be no twin: with either in the model the other is asked for
-    beside = selector.scan([*others, index]).statistic
-    same = lambda j: index in selector.freely or beside[j] < _ASKED_STILL * scan.statistic[j]
-    near = [j for j in near if alike(j) and same(j)]
+    near = [j for j in near if alike(j)]
     twins = sorted(near, key=lambda j: -log[j])[:_TWINS]
     return Named(index, scan.effects[index], by_name[own], sorted(rivals, key=lambda rival: -rival[1]), twins)
 

@@ -126,6 +126,7 @@ class Scanned(Selector):
         one = np.array(statistics)
         seen = lambda statistic: SimpleNamespace(effects=self.candidates, statistic=statistic, value=0.5 * statistic)
         self.scan = lambda others: seen(left * one if others else one)
+        self.p_value = lambda index, scan: np.exp(-0.5 * scan.statistic[index])
         self.stand_in = lambda others, index: np.ones(len(effects), bool)
 
 
@@ -146,11 +147,12 @@ def test_the_same_effect_elsewhere_is_fitted_and_is_no_rival():
 
 
 def test_what_does_as_much_and_is_asked_for_still_is_no_twin():
-    """Claim: of nearly the same χ² another effect is no twin where 70 % of it are left beside the first, unless a free
-    run asked for that."""
+    """Claim: of nearly the same χ² another effect is no twin and no rival where 70 % of it, by no chance, are left beside
+    the first, unless a free run asked for that."""
     effects = {"here": QuadraticDamping("x", -0.5), "there": CubicDamping("y", -0.5)}
     other = Scanned([600.0, 595.0], left=0.7, **effects)
-    assert named_on(other, [], 0).twins == []
+    assert (named_on(other, [], 0).twins, named_on(other, [], 0).rivals) == ([], [])
+    assert named_on(Scanned([6.0, 5.9], left=0.7, **effects), [], 0).rivals != []
     assert named_on(Scanned([600.0, 595.0], left=0.3, **effects), [], 0).twins == [1]
     other.freely.add(0)
     assert named_on(other, [], 0).twins == [1]
