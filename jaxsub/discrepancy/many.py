@@ -14,11 +14,12 @@ from .ahead import Ahead, proved
 from .examine import listed, weighed
 from .model import sound, told
 from .name import Named, refitted
+from .show import Luck
 from .trial import Fits, Model, Trial, Tries, borne_out, refitted_all, worth_trying
 from .verdict import CERTAIN, NOTHING, Judged, both, by_all, helped, judge, settled
 
-# effects beyond which no more are sought
-_MANY = 16
+# effects beyond which no more are sought, and sets that may be refused
+_MANY, _REFUSALS = 16, 2
 # rivals of what is not certain, tried in its place once all others are there
 _ANEW = 2
 
@@ -32,23 +33,35 @@ def by_what_comes_next(
     ahead = Ahead(trial)
     start = best = ahead.begin(base)
     named: list[Named] = []
-    judged = NOTHING
-    while len(best.added) < _MANY:
+    judged, fallen, refusals = NOTHING, set[str](), 0
+    while len(best.added) < _MANY and refusals <= _REFUSALS:
         selector = listed(best.view, vocabulary)
         selector.lose_free_run()
+        selector.usable[[effect.label in fallen for effect in selector.candidates]] = False
         found = weighed(best.view, selector, trial.progress)
         said = judge(found.naming, found.pattern, found.memory)
         chosen = worth_trying(found, said)
+        if not chosen:
+            break
         tries = Tries(ahead, best, found, False)
         kept = _standing(tries, chosen)
         if not kept:
-            break
-        named += refitted_all(tries, kept, ())
-        best, judged = tries.model([*kept]), both(judged, dataclasses.replace(said, named=[], notes=[]))
+            fallen.add(selector.candidates[chosen[0]].label)
+            refusals += 1
+            continue
+        judged = both(judged, dataclasses.replace(said, named=[], notes=[]))
+        more = [*named, *refitted_all(tries, kept, ())]
+        best, named, _ = _asked_for(ahead, start, tries.model([*kept]), more)
+        fallen |= {one.effect.label for one in more} - {one.effect.label for one in named}
     best, named = _asked_again(ahead, start, best, named)
-    best, judged = _asked_for(ahead, start, best, named, judged)
-    whole = proved(trial, base, best) if judged.named else None
-    return None if whole is None else (whole, by_all(judged, whole.shown.pieces))
+    best, named, gains = _asked_for(ahead, start, best, named)
+    whole = proved(trial, base, best) if named else None
+    if whole is None:
+        return None
+    judged = settled(judged, named)
+    for one in named:
+        judged = helped(judged, one.effect, gains[one.effect.label])
+    return whole, by_all(judged, whole.shown.pieces)
 
 
 def _standing(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
@@ -85,19 +98,18 @@ def _asked_again(ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
     return best, said
 
 
-def _asked_for(ahead: Ahead, start: Model, best: Model, named: Sequence[Named], judged: Judged) -> tuple[Model, Judged]:
-    """The model with those of `named` that the held-out runs ask for beside the others, and what is to be said."""
+def _asked_for(
+    ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
+) -> tuple[Model, list[Named], dict[str, Luck]]:
+    """The model with those of `named` that the held-out runs ask for beside the others, and what they gain by each."""
     while named:
         gains = {one.effect.label: ahead.without(best, one.effect) for one in named}
         worst = min(gains, key=lambda label: (gains[label].helps, gains[label].likelihood))
         if gains[worst].helps and told(best.view, best.added):
-            judged = settled(judged, list(named))
-            for one in named:
-                judged = helped(judged, one.effect, gains[one.effect.label])
-            return best, judged
+            return best, [*named], gains
         named = [one for one in named if one.effect.label != worst]
         labels = {one.effect.label for one in named}
         fewer = [effect for effect in best.view.vehicle.effects if effect.label in labels]
         near = best.view.vehicle.without_effect(worst)
         best = ahead.with_effects(start, fewer, best.view.disturbance, [near])
-    return start, NOTHING
+    return start, [], {}

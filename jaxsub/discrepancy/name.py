@@ -152,8 +152,7 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
         may &= ~(asked & (beside.statistic > _ASKED_STILL * scan.statistic))
     may[index] = True
     log = np.where(may, scan.value, -np.inf)
-    weights = np.exp(log - np.max(log))
-    weights /= np.sum(weights)
+    weights = special.softmax(log)
     own, label = selector.candidates[index].name, selector.candidates[index].label
     by_name: dict[str, float] = {}
     # of its own effect the best in every place: elsewhere it is no rival, but may be a twin
@@ -173,7 +172,7 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     alike = lambda j: scan.statistic[j] > (1.0 - far(j)) * scan.statistic[index] or log[j] > log[index]
     near = [j for j in near if alike(j)]
     twins = sorted(near, key=lambda j: -log[j])[:_TWINS]
-    return Named(index, scan.effects[index], by_name[own], sorted(rivals, key=lambda rival: -rival[1]), twins)
+    return Named(index, scan.effects[index], min(1.0, by_name[own]), sorted(rivals, key=lambda rival: -rival[1]), twins)
 
 
 def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Named:
@@ -187,7 +186,7 @@ def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Na
     found = [(effect, share * float(w)) for (effect, _), w in zip(values, weights, strict=True)]
     others = [pair for pair in named.rivals if pair[0].name not in names]
     others += [pair for pair in found if pair[0].name != named.effect.name and pair[1] > _POSSIBLE]
-    probability = sum(p for effect, p in found if effect.name == named.effect.name)
+    probability = min(1.0, sum(p for effect, p in found if effect.name == named.effect.name))
     return dataclasses.replace(named, probability=probability, rivals=sorted(others, key=lambda pair: -pair[1]))
 
 

@@ -147,8 +147,8 @@ def test_the_same_effect_elsewhere_is_fitted_and_is_no_rival():
 
 
 def test_what_does_as_much_and_is_asked_for_still_is_no_twin():
-    """Claim: of nearly the same χ² another effect is no twin and no rival where 70 % of it, by no chance, are left beside
-    the first, unless a free run asked for that."""
+    """Claim: of nearly the same χ² another effect is no twin and no rival where 70 % of it, by no chance, are left
+    beside the first, unless a free run asked for that."""
     effects = {"here": QuadraticDamping("x", -0.5), "there": CubicDamping("y", -0.5)}
     other = Scanned([600.0, 595.0], left=0.7, **effects)
     assert (named_on(other, [], 0).twins, named_on(other, [], 0).rivals) == ([], [])
