@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from jaxsub.cli import diagnose, session
-from jaxsub.recording import Recording, save
+from jaxsub.cli import session
+from jaxsub.discrepancy import diagnose
+from jaxsub.recording import Recording, load, save
 from jaxsub.vehicle import read_vehicle, write_vehicle
 from jaxsub.vehicle.catalogue import remus_100
 
@@ -57,32 +58,30 @@ def write(folder: Path, number: int) -> None:
 
 
 def judged(folder: Path) -> dict:
-    """What `jaxsub diagnose` says of the files, beside what is true."""
+    """What a diagnosis says of the files, the last run held out, beside what is true."""
+    runs = [load(path) for path in sorted(folder.glob("run*.csv"))]
     begin = time.perf_counter()
-    diagnose.run(folder / "vehicle.toml", sorted(folder.glob("run*.csv")), (), folder / "out", False, manoeuvre=False)
+    told = lambda message: session.console.print(message, highlight=False, markup=False)
+    found, _ = diagnose(read_vehicle(folder / "vehicle.toml"), runs[:-1], runs[-1:], progress=told)
     seconds = time.perf_counter() - begin
-    found = json.loads((folder / "out" / "diagnosis.json").read_text(encoding="utf-8"))
-    # what is named comes first in the improved vehicle, and what only stands in after it
-    effects = read_vehicle(folder / "out" / "improved.toml").effects if found["physics"] else ()
     numbers = {}
-    for entry, effect in zip(found["physics"], effects, strict=False):
-        assert entry["effect"] == effect.name
-        first, *_ = entry["parameters"].values()
-        numbers[effect.label] = {
-            "value": first["value"],
-            "standard_error": first["standard_error"],
-            "published": MISSING.get(effect.label),
-            "probability": entry["probability"],
+    for one in found.physics:
+        first, *_ = one.parameters.values()
+        numbers[one.label] = {
+            "value": first.value,
+            "standard_error": first.standard_error,
+            "published": MISSING.get(one.label),
+            "probability": one.probability,
         }
     return {
-        "verdict": found["verdict"],
+        "verdict": found.verdict,
         "there": [label for label in numbers if label in MISSING],
         "alike": [label for label in numbers if label in ALIKE],
         "not_there": [label for label in numbers if label not in MISSING and label not in ALIKE],
         "missed": [label for label in MISSING if label not in numbers],
         "numbers": numbers,
-        "held_out": found["fit"]["held_out"],
-        "gain": found["held_out_gain"],
+        "held_out": found.fit["held_out"],
+        "notes": found.notes,
         "seconds": seconds,
     }
 

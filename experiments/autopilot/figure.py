@@ -19,7 +19,7 @@ def draw(lines: Sequence[dict], path: Path) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 5.2), layout="constrained", width_ratios=(1.3, 1.0))
     for place, label in enumerate(MISSING):
         found = [line["numbers"][label] for line in lines if label in line["numbers"]]
-        at = place + np.linspace(-0.2, 0.2, len(found)) if len(found) > 1 else [place]
+        at = place + (np.linspace(-0.2, 0.2, len(found)) if len(found) > 1 else np.zeros(len(found)))
         for y, one in zip(at, found, strict=True):
             published = one["published"]
             error = 1.96 * one["standard_error"] / abs(published)

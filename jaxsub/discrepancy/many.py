@@ -66,7 +66,7 @@ def by_what_comes_next(
 
 def _standing(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
     """Those of `chosen` that stand on the held-out runs, if their fit bears them all out; else the first of them alone
-    where that is more probable.
+    where the others do not stand or are less probable.
 
     What is chosen first does most, and of what is so large a linear picture sees other things in its place.
     """
@@ -75,7 +75,7 @@ def _standing(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
         kept = borne_out(tries, some)
         if kept and tries.gain([], [*kept]).helps and (not best or tries.value([*kept]) > tries.value([*best])):
             best = kept
-        if len(kept) == len(chosen):
+        if best and len(kept) == len(chosen):
             break
     return best
 
