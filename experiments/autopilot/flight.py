@@ -18,14 +18,12 @@ _MASS, _IX, _IY = _WEIGHT / _GRAVITY, 0.177, 3.45
 _FIN = 0.3
 
 # labels of the vocabulary with the numbers that the publication has for them, SI
-LINEAR = {
+MISSING = {
     "speed-scaling[sway,sway]": -28.6, "speed-scaling[sway,yaw]": 5.22, "speed-scaling[heave,heave]": -28.6,
     "speed-scaling[heave,pitch]": -5.22, "speed-scaling[pitch,heave]": 24.0, "speed-scaling[pitch,pitch]": -2.0,
     "speed-scaling[yaw,sway]": -24.0, "speed-scaling[yaw,yaw]": -2.0,
     "speed-scaling[sway,rudder]": 2.0 * 9.64 * SPEED, "speed-scaling[heave,stern_plane]": -2.0 * 9.64 * SPEED,
     "speed-scaling[pitch,stern_plane]": -2.0 * 6.15 * SPEED, "speed-scaling[yaw,rudder]": -2.0 * 6.15 * SPEED,
-}  # fmt: skip
-MISSING = LINEAR | {
     "quadratic-damping[sway]": -1310.0, "quadratic-damping[heave]": -131.0, "quadratic-damping[roll]": -0.13,
     "quadratic-damping[pitch]": -188.0, "quadratic-damping[yaw]": -94.0, "coriolis-coupling": 1.0,
 }  # fmt: skip

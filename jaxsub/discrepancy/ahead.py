@@ -18,9 +18,9 @@ from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .evidence import evidence_of
-from .model import freed, joined, sound, told
+from .model import freed, joined, places, sound, told
 from .programs import make_room
-from .show import Luck, begun_anew, expects, luck, starts
+from .show import HeldOut, Luck, begun_anew, expects, luck, starts
 from .stiffness import substeps_for
 from .trial import Model, Trial
 from .view import View, led_from, look
@@ -62,12 +62,14 @@ class Ahead:
         view = led_from(vehicle, runs, model.view.sigma, disturbances)
         return self._model(model, view, effects)
 
-    def instead(self, start: Model, best: Model, effect: AbstractEffect, rival: AbstractEffect) -> Model:
-        """The `best` model, begun from `start`, with a `rival` in the place of an effect."""
-        vehicle = best.view.vehicle.without_effect(effect.label).with_effect(rival)
-        others = {one.label for one in best.added[len(start.added) :]} - {effect.label} | {rival.label}
-        effects = [one for one in vehicle.effects if one.label in others]
-        return self.with_effects(start, effects, best.view.disturbance, [vehicle])
+    def instead(self, start: Model, best: Model, label: str, *rival: AbstractEffect) -> Model:
+        """The `best` model, begun from `start`, without one effect, or with a `rival` in its place."""
+        vehicle = best.view.vehicle.without_effect(label)
+        for effect in rival:
+            vehicle = vehicle.with_effect(effect)
+        before = {effect.label for effect in start.view.vehicle.effects}
+        more = [effect for effect in vehicle.effects if effect.label not in before]
+        return self.with_effects(start, more, best.view.disturbance, [vehicle])
 
     def without(self, best: Model, effect: AbstractEffect) -> Luck:
         """What the held-out runs gain by one of a model's effects.
@@ -75,35 +77,32 @@ class Ahead:
         Without it the other numbers are where innovations would have them by a linear picture, which is close: beside
         it they are told, and no program is made for a vehicle that has one effect less.
         """
-        trial, view = self.trial, best.view
-        vehicle = less(view, effect)
-        runs = trial.all_runs(best.fit)
-        expected = expects(vehicle, runs, trial.chosen, trial.size, trial.sigma, view.disturbance)
-        return luck(dataclasses.replace(best.shown, expected=expected), best.shown, True, freely=False)
+        fewer = self._shown(best.shown, best.view, less(best.view, effect))
+        return luck(fewer, best.shown, True, freely=False)
 
     def _model(self, model: Model, view: View, effects: Sequence[AbstractEffect]) -> Model:
-        trial, start = self.trial, initial_guess(view.vehicle, view.runs)[0]
+        start = initial_guess(view.vehicle, view.runs)[0]
         ended = {"cost": jnp.asarray(-evidence_of(view)), "steps": jnp.asarray(0), "result": RESULTS.successful}
         fit = evaluate(view.vehicle, view.runs, start, view.sigma, **ended)
-        runs = trial.all_runs(fit)
-        expected = expects(view.vehicle, runs, trial.chosen, trial.size, trial.sigma, view.disturbance)
-        shown = dataclasses.replace(model.shown, expected=expected)
-        return Model(fit, view, shown, (*model.added, *effects))
+        return Model(fit, view, self._shown(model.shown, view, view.vehicle), (*model.added, *effects))
+
+    def _shown(self, shown: HeldOut, view: View, vehicle: AbstractVehicle) -> HeldOut:
+        """What `shown` is with what a `vehicle` expects under the disturbance of a view."""
+        trial, runs = self.trial, self.trial.all_runs(view.runs.substeps)
+        expected = expects(vehicle, runs, trial.chosen, trial.size, trial.sigma, view.disturbance)
+        return dataclasses.replace(shown, expected=expected)
 
 
 def less(view: View, effect: AbstractEffect) -> AbstractVehicle:
     r"""A view's vehicle with as good as nothing of one effect, $\theta - P_{\cdot a} P_{aa}^{-1} (a - a_0)$."""
-    rows, values, symbols = view.vehicle.layout.free, view.vehicle.values(), effect.symbols()
-    names = [row.name for row in rows]
-    own = [f"{effect.label}.{symbols[name]}" for name in amplitudes(effect) or symbols]
-    at = [names.index(name) for name in own]
-    here = np.array([float(values[name]) for name in names])
+    rows, values, at = view.vehicle.layout.free, view.vehicle.values(), places(view, effect)
+    here = np.array([float(values[row.name]) for row in rows])
     # a lag or the like that is zero is another kind of thing
     gone = (0.0 if amplitudes(effect) else _AS_NOTHING) * here[at]
     moved = here - view.covariance[:, at] @ np.linalg.solve(view.covariance[np.ix_(at, at)], here[at] - gone)
     moved = np.clip(moved, [row.lower for row in rows], [row.upper for row in rows])
     moved[at] = gone
-    return view.vehicle.with_values({name: jnp.asarray(value) for name, value in zip(names, moved, strict=True)})
+    return view.vehicle.with_values({row.name: jnp.asarray(value) for row, value in zip(rows, moved, strict=True)})
 
 
 def proved(trial: Trial, base: Model, best: Model) -> Model | None:

@@ -43,7 +43,7 @@ def by_what_comes_next(
         chosen = worth_trying(found, said)
         if not chosen:
             break
-        tries = Tries(ahead, best, found, False)
+        tries = Tries(ahead.with_effects, best, found, False)
         kept = _standing(tries, chosen)
         if not kept:
             fallen.add(selector.candidates[chosen[0]].label)
@@ -88,7 +88,7 @@ def _asked_again(ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
         there = {effect.label for effect in best.added}
         rivals = [rival for rival, _ in one.rivals[:_ANEW] if rival.label not in there]
         if one.probability < CERTAIN:
-            models += [(rival, ahead.instead(start, best, one.effect, rival)) for rival in rivals]
+            models += [(rival, ahead.instead(start, best, one.effect.label, rival)) for rival in rivals]
         stands = lambda model: sound(model.fit, model.added) and told(model.view, model.added)
         models = [(effect, model) for effect, model in models if stands(model)] or models[:1]
         values = [(effect, -float(model.fit.cost)) for effect, model in models]
@@ -108,8 +108,5 @@ def _asked_for(
         if gains[worst].helps and told(best.view, best.added):
             return best, [*named], gains
         named = [one for one in named if one.effect.label != worst]
-        labels = {one.effect.label for one in named}
-        fewer = [effect for effect in best.view.vehicle.effects if effect.label in labels]
-        near = best.view.vehicle.without_effect(worst)
-        best = ahead.with_effects(start, fewer, best.view.disturbance, [near])
+        best = ahead.instead(start, best, worst)
     return start, [], {}

@@ -91,16 +91,19 @@ def p_value(view: View, effect: AbstractEffect) -> float:
     By the Wald statistic $a^T P^{-1} a$ of its amplitudes, which then is $\chi^2$, or of the numbers of an effect that
     has no amplitude. One that changes nothing, such as a limit that nothing reaches, is not told, however large it is.
     """
-    names, values = [row.name for row in view.vehicle.layout.free], view.vehicle.values()
-    symbols = effect.symbols()
-    own = [f"{effect.label}.{symbols[name]}" for name in amplitudes(effect) or symbols]
-    at = [names.index(name) for name in own]
+    names, values, at = [row.name for row in view.vehicle.layout.free], view.vehicle.values(), places(view, effect)
     columns = [np.asarray(part)[..., 1:][..., at] for part in jax.tree.leaves(view.base)]
     if all(np.max(np.abs(part)) < _NO_COLUMN for part in columns):
         return 1.0
-    size = np.array([float(values[name]) for name in own])
+    size = np.array([float(values[names[i]]) for i in at])
     wald = size @ np.linalg.solve(view.covariance[np.ix_(at, at)], size)
     return float(special.chdtrc(len(at), max(float(wald), 0.0)))
+
+
+def places(view: View, effect: AbstractEffect) -> list[int]:
+    """Where an effect's amplitudes, or its numbers if it has none, are among the free numbers of a view's vehicle."""
+    names, symbols = [row.name for row in view.vehicle.layout.free], effect.symbols()
+    return [names.index(f"{effect.label}.{symbols[name]}") for name in amplitudes(effect) or symbols]
 
 
 def allowing_for(view: View, fit: Fit) -> Fit:

@@ -1,8 +1,8 @@
 """Effects put into the model, fitted, and tried on runs that no fit saw."""
 
 import dataclasses
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol, runtime_checkable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Array
@@ -103,36 +103,24 @@ class Trial:
 
     def held_out(self, fit: Fit, disturbance: Disturbance, pieces: int = 1) -> HeldOut:
         """A fit's vehicle on them, each cut into `pieces`."""
-        return hold(fit.vehicle, self.all_runs(fit), self.chosen, self.size, self.sigma, disturbance, pieces)
+        return hold(
+            fit.vehicle, self.all_runs(fit.runs.substeps), self.chosen, self.size, self.sigma, disturbance, pieces
+        )
 
-    def all_runs(self, fit: Fit) -> Runs:
-        """The runs with the steps of a fit."""
-        return dataclasses.replace(self.runs, substeps=fit.runs.substeps)
-
-
-@runtime_checkable
-class Makes(Protocol):
-    """What makes a model with some effects more of another, by its own rules."""
-
-    def with_effects(
-        self,
-        model: Model,
-        effects: Sequence[AbstractEffect],
-        disturbance: Disturbance,
-        near: Sequence[AbstractVehicle] = (),
-    ) -> Model:
-        """As `Trial.with_effects`."""
-        ...
+    def all_runs(self, substeps: int) -> Runs:
+        """The runs with so many steps in a sample interval."""
+        return dataclasses.replace(self.runs, substeps=substeps)
 
 
 class Tries:
     """Models with some of the candidates of one look at the recordings, by number, each fitted once.
 
-    `freely` says whether it was a free run that asked for them, which then judges them.
+    `make` puts effects into a model as `Trial.with_effects` does. `freely` says whether it was a free run that asked
+    for them, which then judges them.
     """
 
-    def __init__(self, trial: Makes, base: Model, found: Found, freely: bool):
-        self.trial, self.found, self.freely = trial, found, freely
+    def __init__(self, make: Callable[..., Model], base: Model, found: Found, freely: bool):
+        self.make, self.found, self.freely = make, found, freely
         self.models: dict[tuple[int, ...], Model] = {(): base}
         self.said: dict[int, Luck] = {}
 
@@ -146,7 +134,7 @@ class Tries:
         key, disturbance = tuple(sorted(numbers)), self.found.naming.products.disturbance
         if key not in self.models:
             near = self._near(key)
-            self.models[key] = self.trial.with_effects(self.models[()], self.effects(key), disturbance, near)
+            self.models[key] = self.make(self.models[()], self.effects(key), disturbance, near)
         return self.models[key]
 
     def _near(self, key: tuple[int, ...]) -> list[AbstractVehicle]:
@@ -251,7 +239,7 @@ def leading(selector: Selector, chosen: Sequence[int]) -> list[int]:
     return [best] if gains[best] > _NEARLY_ALL * (selector.value(chosen) - before) else []
 
 
-def tried(trial: Makes, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
+def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
     """The model with those of `chosen` that stand on the held-out runs, and what is then to be said.
 
     The one that leads, or all together, or else the best that stands alone: where the model errs much, a linear
@@ -259,7 +247,7 @@ def tried(trial: Makes, base: Model, found: Found, chosen: Sequence[int], judged
     Where none does, those that were fitted are no candidates of `found` any more.
     """
     freely = not found.selector.freely.isdisjoint(chosen)
-    tries, effects = Tries(trial, base, found, freely), found.selector.candidates
+    tries, effects = Tries(trial.with_effects, base, found, freely), found.selector.candidates
     kept = alone(tries, leading(found.selector, chosen))
     if not kept and len(chosen) > 1:
         kept = together(tries, chosen) or alone(tries, chosen)
