@@ -17,13 +17,17 @@ _MASS, _IX, _IY = _WEIGHT / _GRAVITY, 0.177, 3.45
 # what a fin may turn, rad
 _FIN = 0.3
 
-# labels of the vocabulary with the numbers that the publication has for them, SI
+# the slope of u² over the speeds that are flown, 1.0 to 1.6 m/s
+_SLOPE = 2.67
+# labels of the vocabulary with the numbers that the publication has for them, SI: of a hull's, less what
+# `coriolis-coupling` does of it, such as the moment of Munk; of a fin's, by the slope
 MISSING = {
-    "speed-scaling[sway,sway]": -28.6, "speed-scaling[sway,yaw]": 5.22, "speed-scaling[heave,heave]": -28.6,
-    "speed-scaling[heave,pitch]": -5.22, "speed-scaling[pitch,heave]": 24.0, "speed-scaling[pitch,pitch]": -2.0,
-    "speed-scaling[yaw,sway]": -24.0, "speed-scaling[yaw,yaw]": -2.0,
-    "speed-scaling[sway,rudder]": 2.0 * 9.64 * SPEED, "speed-scaling[heave,stern_plane]": -2.0 * 9.64 * SPEED,
-    "speed-scaling[pitch,stern_plane]": -2.0 * 6.15 * SPEED, "speed-scaling[yaw,rudder]": -2.0 * 6.15 * SPEED,
+    "speed-scaling[sway,sway]": -28.6, "speed-scaling[sway,yaw]": 5.22 + 0.93, "speed-scaling[heave,heave]": -28.6,
+    "speed-scaling[heave,pitch]": -5.22 - 0.93, "speed-scaling[pitch,heave]": 24.0 - (35.5 - 0.93),
+    "speed-scaling[pitch,pitch]": -2.0 - 1.93, "speed-scaling[yaw,sway]": -24.0 + (35.5 - 0.93),
+    "speed-scaling[yaw,yaw]": -2.0 - 1.93,
+    "speed-scaling[sway,rudder]": 9.64 * _SLOPE, "speed-scaling[heave,stern_plane]": -9.64 * _SLOPE,
+    "speed-scaling[pitch,stern_plane]": -6.15 * _SLOPE, "speed-scaling[yaw,rudder]": -6.15 * _SLOPE,
     "quadratic-damping[sway]": -1310.0, "quadratic-damping[heave]": -131.0, "quadratic-damping[roll]": -0.13,
     "quadratic-damping[pitch]": -188.0, "quadratic-damping[yaw]": -94.0, "coriolis-coupling": 1.0,
 }  # fmt: skip

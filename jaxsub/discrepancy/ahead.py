@@ -18,7 +18,7 @@ from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .evidence import evidence_of
-from .model import freed, joined, places, sound, told
+from .model import freed, joined, places
 from .programs import make_room
 from .show import HeldOut, Luck, begun_anew, expects, luck, starts
 from .stiffness import substeps_for
@@ -122,8 +122,7 @@ def proved(trial: Trial, base: Model, best: Model) -> Model | None:
         fit = freed(best.fit, best.view.vehicle)
         view = look(fit, best.view.disturbance)
         after = Model(fit, view, trial.held_out(fit, view.disturbance), best.added)
-    stands = sound(after.fit, after.added) and told(after.view, after.added)
-    return after if luck(before.shown, after.shown, stands, freely=True).helps else None
+    return after if luck(before.shown, after.shown, after.stands, freely=True).helps else None
 
 
 def pieces_of(view: View) -> int | None:

@@ -7,7 +7,6 @@ from ..results import RESULTS
 from .evidence import evidence_of
 from .examine import examine, weighed
 from .many import by_what_comes_next
-from .model import sound, told
 from .name import MOST_EFFECTS
 from .show import luck
 from .trial import Found, Model, Trial, tried, worth_trying
@@ -78,7 +77,7 @@ def without_idle(
             baseline, [e for e in best.fit.vehicle.effects if e.label in others], best.view.disturbance
         )
         stands = any(luck(fewer.shown, best.shown, True, freely=freely).helps for freely in (False, True))
-        if not stands and sound(fewer.fit, fewer.added) and told(fewer.view, fewer.added):
+        if not stands and fewer.stands:
             best, judged = fewer, idle(judged, effect.label, others)
     return best, judged
 

@@ -12,10 +12,11 @@ import numpy as np
 from ..effects import AbstractEffect
 from .ahead import Ahead, proved
 from .examine import listed, weighed
-from .model import sound, told
+from .model import p_value
 from .name import Named, refitted
-from .show import Luck
-from .trial import Fits, Model, Trial, Tries, borne_out, refitted_all, worth_trying
+from .selector import SIGNIFICANCE
+from .show import Luck, luck
+from .trial import Model, Trial, Tries, borne_out, refitted_all, worth_trying
 from .verdict import CERTAIN, NOTHING, Judged, both, by_all, helped, judge, settled
 
 # effects beyond which no more are sought, and sets that may be refused
@@ -43,18 +44,16 @@ def by_what_comes_next(
         chosen = worth_trying(found, said)
         if not chosen:
             break
-        tries = Tries(ahead.with_effects, best, found, False)
-        kept = _standing(tries, chosen)
-        if not kept:
+        grown = _grown(ahead, start, Tries(ahead.with_effects, best, found, False), chosen, named)
+        if grown is None:
             fallen.add(selector.candidates[chosen[0]].label)
             refusals += 1
             continue
         judged = both(judged, dataclasses.replace(said, named=[], notes=[]))
-        more = [*named, *refitted_all(tries, kept, ())]
-        best, named, _ = _asked_for(ahead, start, tries.model([*kept]), more)
-        fallen |= {one.effect.label for one in more} - {one.effect.label for one in named}
+        best, named, refused = grown
+        fallen |= refused
     best, named = _asked_again(ahead, start, best, named)
-    best, named, gains = _asked_for(ahead, start, best, named)
+    best, named, gains = asked_for(ahead, start, best, named)
     whole = proved(trial, base, best) if named else None
     if whole is None:
         return None
@@ -64,20 +63,23 @@ def by_what_comes_next(
     return whole, by_all(judged, whole.shown.pieces)
 
 
-def _standing(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
-    """Those of `chosen` that stand on the held-out runs, if their fit bears them all out; else the first of them alone
-    where the others do not stand or are less probable.
+def _grown(
+    ahead: Ahead, start: Model, tries: Tries, chosen: Sequence[int], named: Sequence[Named]
+) -> tuple[Model, list[Named], set[str]] | None:
+    """The model with those of `chosen` and of what was `named` before that the held-out runs ask for beside each other,
+    if they gain, and what they refuse; or with the first of them alone where the others lead astray.
 
-    What is chosen first does most, and of what is so large a linear picture sees other things in its place.
+    One that they refuse takes none of the others along. What is chosen first does most, and of what is so large a
+    linear picture sees other things in its place.
     """
-    best: dict[int, Fits] = {}
-    for some in (chosen, chosen[:1]):
+    before = tries.model([])
+    for some in [chosen, chosen[:1]][: len(chosen)]:
         kept = borne_out(tries, some)
-        if kept and tries.gain([], [*kept]).helps and (not best or tries.value([*kept]) > tries.value([*best])):
-            best = kept
-        if best and len(kept) == len(chosen):
-            break
-    return best
+        more = [*named, *refitted_all(tries, kept, ())]
+        model, stand, _ = asked_for(ahead, start, tries.model([*kept]), more)
+        if luck(before.shown, model.shown, model.stands, freely=False).helps:
+            return model, stand, {one.effect.label for one in more} - {one.effect.label for one in stand}
+    return None
 
 
 def _asked_again(ahead: Ahead, start: Model, best: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
@@ -89,8 +91,7 @@ def _asked_again(ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
         rivals = [rival for rival, _ in one.rivals[:_ANEW] if rival.label not in there]
         if one.probability < CERTAIN:
             models += [(rival, ahead.instead(start, best, one.effect.label, rival)) for rival in rivals]
-        stands = lambda model: sound(model.fit, model.added) and told(model.view, model.added)
-        models = [(effect, model) for effect, model in models if stands(model)] or models[:1]
+        models = [(effect, model) for effect, model in models if model.stands] or models[:1]
         values = [(effect, -float(model.fit.cost)) for effect, model in models]
         place = int(np.argmax([value for _, value in values]))
         best = models[place][1]
@@ -98,14 +99,21 @@ def _asked_again(ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
     return best, said
 
 
-def _asked_for(
+def asked_for(
     ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
 ) -> tuple[Model, list[Named], dict[str, Luck]]:
     """The model with those of `named` that the held-out runs ask for beside the others, and what they gain by each."""
-    while named:
+    while named and best.view.finite:
         gains = {one.effect.label: ahead.without(best, one.effect) for one in named}
-        worst = min(gains, key=lambda label: (gains[label].helps, gains[label].likelihood))
-        if gains[worst].helps and told(best.view, best.added):
+        luck_of = {one.effect.label: p_value(best.view, one.effect) for one in named}
+        # first of all what is not told, then what the held-out runs do not ask for, the least first
+        asked = lambda label, gains=gains, luck_of=luck_of: (
+            -max(luck_of[label], SIGNIFICANCE),
+            gains[label].helps,
+            np.nan_to_num(gains[label].likelihood),
+        )
+        worst = min(gains, key=asked)
+        if gains[worst].helps and luck_of[worst] < SIGNIFICANCE:
             return best, [*named], gains
         named = [one for one in named if one.effect.label != worst]
         best = ahead.instead(start, best, worst)

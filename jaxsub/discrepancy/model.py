@@ -11,8 +11,9 @@ from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, nu
 from ..estimate import Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
+from .leading import by_cost
 from .selector import SIGNIFICANCE
-from .view import View, by_cost
+from .view import View
 
 # a shape such as a lag at which its effect is gone
 _VANISHED = 1e-6

@@ -65,6 +65,11 @@ class Model(NamedTuple):
     shown: HeldOut
     added: tuple[AbstractEffect, ...]
 
+    @property
+    def stands(self) -> bool:
+        """Whether all came out of the fit as physics admits, and the recordings tell each beside the others."""
+        return sound(self.fit, self.added) and told(self.view, self.added)
+
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
@@ -152,9 +157,8 @@ class Tries:
         return [vehicle]
 
     def sound(self, numbers: Sequence[int]) -> bool:
-        """Whether they came out of the fit as physics admits, and the recordings tell each beside the others."""
-        model = self.model(numbers)
-        return sound(model.fit, model.added) and told(model.view, model.added)
+        """Whether their model stands."""
+        return self.model(numbers).stands
 
     def unsound(self, numbers: Sequence[int]) -> list[int]:
         """Those of a set that did not come out of its fit so, the worst first."""

@@ -2,8 +2,6 @@
 
 import dataclasses
 from collections.abc import Iterable
-from functools import cached_property
-from typing import TypeVar
 
 import equinox as eqx
 import jax
@@ -12,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..effects import Facts, Motion, wave_band
-from ..estimate import Fit, Problem, estimate_disturbance
+from ..estimate import Fit, Problem
 from ..likelihood import (
     Columns,
     Disturbance,
@@ -20,21 +18,15 @@ from ..likelihood import (
     System,
     first_guess,
     fitted,
-    follow,
-    products,
-    restricted_of,
     smoothed,
     whitened_squares,
 )
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
+from .leading import At, Led, apart, arrived, by_cost, of_order, settled, turned
 from .tones import tones
 from .whiteness import record_sigma
 
-# of a scoring step or of a change of the disturbance, tried one after the other
-_SHARES = (1.0, 0.5)
-# disturbance and numbers are sought in turns until the log likelihood changes by less
-_TURNS, _SETTLED = 8, 0.5
 # rms over sigma of a channel, above which a fit is not trusted to have ended near the truth
 _MUCH = 2.0
 # of the channels that may alone be wrong, those that are tried
@@ -42,10 +34,6 @@ _DOUBTED = 3
 # of the forces that would explain all that is left: too small to lead a path, and large enough to grow from
 _QUIET = 1e-2
 _LEAST_WHITE = 1e-5
-# a direction of the coefficients that nothing tells, relative to one that one column tells alone
-_UNTOLD = 1e-7
-# times a number of the vehicle file, as far as it may be off where the file does not say
-_ABOUT = 10.0
 
 
 class Trajectory(eqx.Module):
@@ -84,9 +72,6 @@ def _trajectory(vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered:
     end = vehicle.motion(expected[:, 1:], nodes[:, :, 2])
     true, seen = vehicle.truth(runs.times, expected, runs.signals)
     return start, end, seen, true, nodes
-
-
-_Costed = TypeVar("_Costed", Fit, "_At")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,9 +124,9 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     velocity log, numbers a hundred times too large can do what an actuator's force does, and nothing would be left to
     name it by.
     """
-    problem, rms = _of_order(fit.problem), fit.rms
+    problem, rms = of_order(fit.problem), fit.rms
     much = max(rms.values()) > _MUCH
-    led = _Led(problem, problem.guess if much else fit.start)
+    led = Led(problem, problem.guess if much else fit.start)
     system = System.of(fit.model, fit.runs, fit.sigma, problem.spread)
     guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
@@ -153,65 +138,28 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     searches = [best([(v, start) for start in some]) for v in vehicles for some in starts]
     searches += by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
     while len(searches) > 1:
-        searches = _apart(_turned(led, at) for at in searches)
+        searches = apart(turned(led, at) for at in searches)
         searches = searches[: max(1, len(searches) // 2)]
-    return led.view(_settled(led, searches[0]))
+    return _seen(led, settled(led, searches[0]))
 
 
 def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: Iterable[Disturbance]) -> View:
     """The view of a vehicle, its free numbers moved from where they are to where innovations are least.
 
-    One search, from the best of some disturbances: of numbers that came of innovations already, but for a few.
+    One search, from the best of some disturbances: of numbers that came of innovations already, but for a few. It goes
+    on until it arrives: of what is far off, a linear picture promises much that is not so.
     """
-    problem = _of_order(Problem.of(vehicle, runs, sigma))
-    led = _Led(problem, problem.guess)
-    return led.view(_settled(led, by_cost(led.at(vehicle, one) for one in disturbances)[0]))
+    problem = of_order(Problem.of(vehicle, runs, sigma))
+    led = Led(problem, problem.guess)
+    return _seen(led, arrived(led, by_cost(led.at(vehicle, one) for one in disturbances)[0]))
 
 
-def _of_order(problem: Problem) -> Problem:
-    """A problem with a wide prior about each number of the file that has none."""
-    vehicle, own = problem.vehicle, problem.vehicle.own_values()
-    width = _ABOUT * jnp.abs(problem.prior_mean)
-    given = jnp.array([row.name in own for row in vehicle.layout.free], bool)
-    wide = given & (width > 0.0) & jnp.isinf(problem.prior_std)
-    return dataclasses.replace(problem, prior_std=jnp.where(wide, width, problem.prior_std))
-
-
-def by_cost(found: Iterable[_Costed]) -> list[_Costed]:
-    """Those of the least `cost` first, and what has no finite one last."""
-    return sorted(found, key=lambda one: float(one.cost) if np.isfinite(float(one.cost)) else np.inf)
-
-
-def _turned(led: "_Led", at: "_At") -> "_At":
-    """The disturbance sought for the numbers, and the numbers under it; or half as far, or as it was, if that is worse.
-
-    It is sought along the path that the former disturbance led, and another may lead elsewhere.
-    """
-    found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance)
-    for share in _SHARES:
-        between = lambda old, new, share=share: old * (new / old) ** share
-        after = led.descend(at.vehicle, jax.tree.map(between, at.disturbance, found))
-        if by_cost([at, after])[0] is after:
-            return after
-    return at
-
-
-def _apart(found: Iterable["_At"]) -> list["_At"]:
-    """By cost, one of those that came to the same place."""
-    apart: list[_At] = []
-    for at in by_cost(found):
-        if not apart or not abs(at.cost - apart[-1].cost) < _SETTLED:
-            apart.append(at)
-    return apart
-
-
-def _settled(led: "_Led", at: "_At") -> "_At":
-    """Both, in turns until they stay; what has no finite cost stays."""
-    for _ in range(_TURNS):
-        before, at = at, _turned(led, at)
-        if not abs(before.cost - at.cost) >= _SETTLED:
-            break
-    return at
+def _seen(led: Led, at: At) -> View:
+    """What is seen from there."""
+    runs, sigma = led.problem.runs, led.problem.sigma
+    path = Trajectory.of(at.vehicle, runs, at.followed.expected, at.followed.filtered)
+    covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
+    return View(at.vehicle, covariance, runs, sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
 def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturbance, list[Disturbance]]:
@@ -232,81 +180,6 @@ def _white(fit: Fit) -> Array:
     white = record_sigma(np.asarray(fit.model.error), np.asarray(fit.runs.mask)) / np.asarray(fit.sigma)
     given = np.array([output.sigma is not None for output in fit.vehicle.layout.outputs])
     return jnp.asarray(np.where(given, 1.0, np.clip(white, _LEAST_WHITE, 1.0)))
-
-
-@dataclasses.dataclass(frozen=True)
-class _At:
-    """The runs followed by a vehicle under a disturbance, its columns of unit length, their priors, and the lengths.
-
-    `gram` are the columns' products, priors included, and `spread` half the log-determinant of the covariance.
-    """
-
-    vehicle: AbstractVehicle
-    disturbance: Disturbance
-    followed: Followed
-    base: Columns
-    prior: Array
-    length: np.ndarray
-    gram: np.ndarray
-    spread: float
-
-    @cached_property
-    def cost(self) -> float:
-        """Minus the log restricted likelihood."""
-        return float(restricted_of(jnp.asarray(self.gram), self.spread))
-
-    @property
-    def as_they_are(self) -> float:
-        """Minus the log likelihood of its numbers."""
-        return 0.5 * float(self.gram[0, 0]) + self.spread
-
-
-@dataclasses.dataclass(frozen=True)
-class _Led:
-    """The recordings of a problem, by which vehicles with other numbers are led from initial states of mean `start`."""
-
-    problem: Problem
-    start: Array
-
-    def at(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> _At:
-        """With the residual's and the parameters' columns in units in which each of the latter is of length one."""
-        problem, names = self.problem, [row.name for row in vehicle.layout.free]
-        followed = follow(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.spread)
-        columns = followed.residual + followed.theta
-        known = len(names) + 1
-        found, spread = products(disturbance, followed.system, columns, jnp.zeros((known, known)))
-        squares = jnp.diag(found)[1:]
-        length = jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
-        unit = jnp.concatenate([jnp.ones(1), length])
-        values = vehicle.values()
-        away = problem.prior_mean - jnp.asarray([float(values[name]) for name in names])
-        pulled = jnp.column_stack([away, jnp.diag(1.0 / length)]) / problem.prior_std[:, None]
-        untold = jnp.full(known, _UNTOLD).at[0].set(0.0)
-        prior = pulled.T @ pulled + jnp.diag(untold)
-        base = jax.tree.map(lambda column: column / unit, columns)
-        gram = np.asarray(found / jnp.outer(unit, unit) + prior)
-        return _At(vehicle, disturbance, followed, base, prior, np.asarray(length), gram, float(spread))
-
-    def descend(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> _At:
-        """Where a scoring step leads, or half of it; no step where neither makes the recordings more probable."""
-        rows = vehicle.layout.free
-        here = np.array([float(vehicle.values()[row.name]) for row in rows])
-        at = self.at(vehicle, disturbance)
-        step = np.linalg.solve(at.gram[1:, 1:], at.gram[1:, 0]) / at.length
-        for share in _SHARES:
-            inside = np.clip(here + share * step, [row.lower for row in rows], [row.upper for row in rows])
-            moved = vehicle.with_values({row.name: jnp.asarray(v) for row, v in zip(rows, inside, strict=True)})
-            trial = self.at(moved, disturbance)
-            if trial.as_they_are < at.as_they_are:
-                return trial
-        return at
-
-    def view(self, at: _At) -> View:
-        """What is seen from there."""
-        runs, sigma = self.problem.runs, self.problem.sigma
-        path = Trajectory.of(at.vehicle, runs, at.followed.expected, at.followed.filtered)
-        covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
-        return View(at.vehicle, covariance, runs, sigma, at.followed, at.disturbance, path, at.base, at.prior)
 
 
 @eqx.filter_jit

@@ -9,7 +9,7 @@ import pytest
 from diagnosis_cases import recorded, wrong
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy import batch, view
+from jaxsub.discrepancy import batch, leading, view
 from jaxsub.discrepancy.evidence import evidence_of
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
@@ -31,14 +31,14 @@ def led_to(times):
 def test_a_turn_leads_to_nothing_less_probable(fitted, monkeypatch):
     """Claim: a search for the disturbance that ends far off changes nothing; where half its way is right, half."""
     found = look(fitted)
-    monkeypatch.setattr(view, "estimate_disturbance", led_to(1.0))
+    monkeypatch.setattr(leading, "estimate_disturbance", led_to(1.0))
     still = evidence_of(look(fitted, found.disturbance))
-    monkeypatch.setattr(view, "estimate_disturbance", led_to(1e8))
+    monkeypatch.setattr(leading, "estimate_disturbance", led_to(1e8))
     assert evidence_of(look(fitted, found.disturbance)) > still - 0.5
     # a hundred times too large at first, and a step of ten thousand down: all of it is too far, half is right
     large = dataclasses.replace(found.disturbance, force=100.0 * found.disturbance.force)
     monkeypatch.setattr(view, "first_guess", lambda system, residual: large)
-    monkeypatch.setattr(view, "estimate_disturbance", led_to(1e-4))
+    monkeypatch.setattr(leading, "estimate_disturbance", led_to(1e-4))
     half = look(fitted)
     assert float(half.disturbance.force[0] / found.disturbance.force[0]) == pytest.approx(1.0, rel=1e-6)
 
@@ -47,12 +47,12 @@ def test_searches_that_agree_are_one():
     """Claim: of searches that came to the same cost one goes on; the order is by cost, those without one last."""
 
     def at(cost):
-        made = object.__new__(view._At)
+        made = object.__new__(leading.At)
         made.__dict__["cost"] = cost
         return made
 
     nan = float("nan")
-    apart = view._apart(at(cost) for cost in (nan, 9.0, 3.0, 9.2, 3.1, nan))
+    apart = leading.apart(at(cost) for cost in (nan, 9.0, 3.0, 9.2, 3.1, nan))
     assert [one.cost for one in apart[:2]] == [3.0, 9.0]
     assert all(one.cost != one.cost for one in apart[2:])
 
@@ -62,12 +62,12 @@ def test_turns_end_where_the_cost_stays_or_there_is_none(monkeypatch, costs, tur
     """Claim: numbers and disturbance are sought in turns while the cost falls, and once where it is no number."""
 
     def at(number):
-        made = object.__new__(view._At)
+        made = object.__new__(leading.At)
         made.__dict__.update(cost=costs[number], number=number)
         return made
 
-    monkeypatch.setattr(view, "_turned", lambda led, one: at(one.__dict__["number"] + 1))
-    assert view._settled(object.__new__(view._Led), at(0)).__dict__["number"] == turns
+    monkeypatch.setattr(leading, "turned", lambda led, one: at(one.__dict__["number"] + 1))
+    assert leading.settled(object.__new__(leading.Led), at(0)).__dict__["number"] == turns
 
 
 def test_numbers_that_the_recordings_do_not_tell_are_of_the_order_of_the_files():

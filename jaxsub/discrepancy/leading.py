@@ -1,0 +1,182 @@
+"""Free numbers and a disturbance, sought together, under which recordings are most probable sample by sample."""
+
+import dataclasses
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from typing import TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+from scipy.optimize import lsq_linear
+
+from ..estimate import Fit, Problem, estimate_disturbance
+from ..likelihood import Columns, Disturbance, Followed, follow, products, restricted_of
+from ..vehicle import AbstractVehicle
+
+# what dampens a scoring step, of a column's squares, and shares of a change of the disturbance, one after the other
+_DAMPED, _SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), (1.0, 0.5)
+# disturbance and numbers are sought in turns until the log likelihood changes by less
+_TURNS, _STEPS, _STAYS = 8, 30, 0.5
+# a direction of the coefficients that nothing tells, relative to one that one column tells alone
+_UNTOLD = 1e-7
+# times a number of the vehicle file, as far as it may be off where the file does not say
+_ABOUT = 10.0
+
+
+@dataclasses.dataclass(frozen=True)
+class At:
+    """The runs followed by a vehicle under a disturbance, its columns of unit length, their priors, and the lengths.
+
+    `gram` are the columns' products, priors included, and `spread` half the log-determinant of the covariance.
+    """
+
+    vehicle: AbstractVehicle
+    disturbance: Disturbance
+    followed: Followed
+    base: Columns
+    prior: Array
+    length: np.ndarray
+    gram: np.ndarray
+    spread: float
+
+    @cached_property
+    def cost(self) -> float:
+        """Minus the log restricted likelihood."""
+        return float(restricted_of(jnp.asarray(self.gram), self.spread))
+
+    @property
+    def as_they_are(self) -> float:
+        """Minus the log likelihood of its numbers."""
+        return 0.5 * float(self.gram[0, 0]) + self.spread
+
+
+@dataclasses.dataclass(frozen=True)
+class Led:
+    """The recordings of a problem, by which vehicles with other numbers are led from initial states of mean `start`."""
+
+    problem: Problem
+    start: Array
+
+    def at(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> At:
+        """With the residual's and the parameters' columns in units in which each of the latter is of length one."""
+        problem, names = self.problem, [row.name for row in vehicle.layout.free]
+        followed = follow(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.spread)
+        columns = followed.residual + followed.theta
+        known = len(names) + 1
+        found, spread = products(disturbance, followed.system, columns, jnp.zeros((known, known)))
+        squares = jnp.diag(found)[1:]
+        length = jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
+        unit = jnp.concatenate([jnp.ones(1), length])
+        values = vehicle.values()
+        away = problem.prior_mean - jnp.asarray([float(values[name]) for name in names])
+        pulled = jnp.column_stack([away, jnp.diag(1.0 / length)]) / problem.prior_std[:, None]
+        untold = jnp.full(known, _UNTOLD).at[0].set(0.0)
+        prior = pulled.T @ pulled + jnp.diag(untold)
+        base = jax.tree.map(lambda column: column / unit, columns)
+        gram = np.asarray(found / jnp.outer(unit, unit) + prior)
+        return At(vehicle, disturbance, followed, base, prior, np.asarray(length), gram, float(spread))
+
+    def descend(self, at: At) -> At:
+        """Where a scoring step leads, or one that is damped (Levenberg 1944), within the bounds of each number; no step
+        where none makes the recordings more probable.
+        """
+        rows = at.vehicle.layout.free
+        here = np.array([float(at.vehicle.values()[row.name]) for row in rows])
+        low, high = (np.array([(row.lower, row.upper) for row in rows]).reshape(-1, 2).T - here) * at.length
+        for damped in _DAMPED:
+            moved = here + _step(at.gram, damped, low, high) / at.length
+            named = {row.name: jnp.asarray(value) for row, value in zip(rows, moved, strict=True)}
+            trial = self.at(at.vehicle.with_values(named), at.disturbance)
+            if trial.as_they_are < at.as_they_are:
+                return trial
+        return at
+
+
+def _step(gram: np.ndarray, damped: float, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The step of least squares between bounds, of the products (p + 1, p + 1) of a residual and its columns.
+
+    One that is cut off at a bound leads astray in all that trades with it.
+    """
+    squares = gram[1:, 1:] + damped * np.eye(len(low))
+    step = np.linalg.solve(squares, gram[1:, 0])
+    if not np.any((step < low) | (step > high)):
+        return step
+    factor = np.linalg.cholesky(squares)
+    return lsq_linear(factor.T, np.linalg.solve(factor, gram[1:, 0]), (low, high), method="bvls").x
+
+
+def of_order(problem: Problem) -> Problem:
+    """A problem with a wide prior about each number of the file that has none."""
+    vehicle, own = problem.vehicle, problem.vehicle.own_values()
+    width = _ABOUT * jnp.abs(problem.prior_mean)
+    given = jnp.array([row.name in own for row in vehicle.layout.free], bool)
+    wide = given & (width > 0.0) & jnp.isinf(problem.prior_std)
+    return dataclasses.replace(problem, prior_std=jnp.where(wide, width, problem.prior_std))
+
+
+Costed = TypeVar("Costed", Fit, At)
+
+
+def by_cost(found: Iterable[Costed]) -> list[Costed]:
+    """Those of the least `cost` first, and what has no finite one last."""
+    return sorted(found, key=lambda one: float(one.cost) if np.isfinite(float(one.cost)) else np.inf)
+
+
+def turned(led: Led, at: At) -> At:
+    """The disturbance sought for the numbers, and the numbers under it; or half as far, or as it was, if that is worse.
+
+    It is sought along the path that the former disturbance led, and another may lead elsewhere.
+    """
+    for disturbance in _towards(at):
+        after = led.descend(led.at(at.vehicle, disturbance))
+        if by_cost([at, after])[0] is after:
+            return after
+    return at
+
+
+def _towards(at: At) -> Iterator[Disturbance]:
+    """The disturbance that its numbers ask for, and one half as far."""
+    found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance)
+    for share in _SHARES:
+        yield jax.tree.map(lambda old, new, share=share: old * (new / old) ** share, at.disturbance, found)
+
+
+def apart(found: Iterable[At]) -> list[At]:
+    """By cost, one of those that came to the same place."""
+    kept: list[At] = []
+    for at in by_cost(found):
+        if not kept or not abs(at.cost - kept[-1].cost) < _STAYS:
+            kept.append(at)
+    return kept
+
+
+def settled(led: Led, at: At) -> At:
+    """Both, in turns until they stay; what has no finite cost stays."""
+    for _ in range(_TURNS):
+        before, at = at, turned(led, at)
+        if not abs(before.cost - at.cost) >= _STAYS:
+            break
+    return at
+
+
+def arrived(led: Led, at: At) -> At:
+    """Both, in turns, the numbers under each disturbance as far as they go, until the recordings gain nothing."""
+    at = _descended(led, at)
+    for _ in range(_TURNS):
+        tries = (_descended(led, led.at(at.vehicle, disturbance)) for disturbance in _towards(at))
+        better = next((after for after in tries if at.as_they_are - after.as_they_are >= _STAYS), None)
+        if better is None:
+            break
+        at = better
+    return at
+
+
+def _descended(led: Led, at: At) -> At:
+    """Steps until they gain nothing."""
+    for _ in range(_STEPS):
+        before, at = at, led.descend(at)
+        if not before.as_they_are - at.as_they_are >= _STAYS:
+            break
+    return at
