@@ -17,8 +17,9 @@ from ..vehicle import AbstractVehicle
 
 # what dampens a scoring step, of a column's squares, and shares of a change of the disturbance, one after the other
 _DAMPED, _SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), (1.0, 0.5)
-# disturbance and numbers are sought in turns until the log likelihood changes by less
-_TURNS, _STEPS, _STAYS = 8, 30, 0.5
+# disturbance and numbers are sought in turns until the log likelihood changes by less, or gains less
+_TURNS, _STAYS = 8, 0.5
+_STEPS, _GAINED = 30, 2.0
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
 # times a number of the vehicle file, as far as it may be off where the file does not say
@@ -29,7 +30,8 @@ _ABOUT = 10.0
 class At:
     """The runs followed by a vehicle under a disturbance, its columns of unit length, their priors, and the lengths.
 
-    `gram` are the columns' products, priors included, and `spread` half the log-determinant of the covariance.
+    `gram` are the columns' products, priors included, and `spread` half the log-determinant of the covariance; `tame`
+    is the number of the damping by which a step led here.
     """
 
     vehicle: AbstractVehicle
@@ -40,6 +42,7 @@ class At:
     length: np.ndarray
     gram: np.ndarray
     spread: float
+    tame: int = 0
 
     @cached_property
     def cost(self) -> float:
@@ -80,17 +83,17 @@ class Led:
 
     def descend(self, at: At) -> At:
         """Where a scoring step leads, or one that is damped (Levenberg 1944), within the bounds of each number; no step
-        where none makes the recordings more probable.
+        where none makes the recordings more probable. The first that is tried is damped a little less than the last.
         """
         rows = at.vehicle.layout.free
         here = np.array([float(at.vehicle.values()[row.name]) for row in rows])
         low, high = (np.array([(row.lower, row.upper) for row in rows]).reshape(-1, 2).T - here) * at.length
-        for damped in _DAMPED:
-            moved = here + _step(at.gram, damped, low, high) / at.length
+        for tame in range(max(at.tame - 1, 0), len(_DAMPED)):
+            moved = here + _step(at.gram, _DAMPED[tame], low, high) / at.length
             named = {row.name: jnp.asarray(value) for row, value in zip(rows, moved, strict=True)}
             trial = self.at(at.vehicle.with_values(named), at.disturbance)
             if trial.as_they_are < at.as_they_are:
-                return trial
+                return dataclasses.replace(trial, tame=tame)
         return at
 
 
@@ -166,7 +169,7 @@ def arrived(led: Led, at: At) -> At:
     at = _descended(led, at)
     for _ in range(_TURNS):
         tries = (_descended(led, led.at(at.vehicle, disturbance)) for disturbance in _towards(at))
-        better = next((after for after in tries if at.as_they_are - after.as_they_are >= _STAYS), None)
+        better = next((after for after in tries if at.as_they_are - after.as_they_are >= _GAINED), None)
         if better is None:
             break
         at = better
@@ -177,6 +180,6 @@ def _descended(led: Led, at: At) -> At:
     """Steps until they gain nothing."""
     for _ in range(_STEPS):
         before, at = at, led.descend(at)
-        if not before.as_they_are - at.as_they_are >= _STAYS:
+        if not before.as_they_are - at.as_they_are >= _GAINED:
             break
     return at
