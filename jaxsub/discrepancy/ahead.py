@@ -9,6 +9,7 @@ needs it, err less with all of it.
 import dataclasses
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -103,6 +104,30 @@ def less(view: View, effect: AbstractEffect) -> AbstractVehicle:
     moved = np.clip(moved, [row.lower for row in rows], [row.upper for row in rows])
     moved[at] = gone
     return view.vehicle.with_values({row.name: jnp.asarray(value) for row, value in zip(rows, moved, strict=True)})
+
+
+def lacking(view: View, effect: AbstractEffect) -> View:
+    """A view as it would be without one effect of its vehicle, by a linear picture from where it stands.
+
+    Once all others are there, it says what would be asked for in its place.
+    """
+    rows, values = view.vehicle.layout.free, view.vehicle.values()
+    own = [i for i, row in enumerate(rows) if row.name.startswith(f"{effect.label}.")]
+    others = [i for i in range(len(rows)) if i not in own]
+    keep = np.eye(1 + len(rows))[:, [0, *(1 + i for i in others)]]
+    # what it does now is no longer there, and so is in the residual
+    for i in places(view, effect):
+        keep[1 + i, 0] = float(values[rows[i].name]) * view.length[i]
+    across = view.covariance[np.ix_(others, own)]
+    taken = across @ np.linalg.solve(view.covariance[np.ix_(own, own)], across.T)
+    return dataclasses.replace(
+        view,
+        vehicle=view.vehicle.without_effect(effect.label),
+        covariance=view.covariance[np.ix_(others, others)] - taken,
+        base=jax.tree.map(lambda column: column @ keep, view.base),
+        prior=keep.T @ view.prior @ keep,
+        length=view.length[others],
+    )
 
 
 def proved(trial: Trial, base: Model, best: Model) -> Model | None:

@@ -226,5 +226,14 @@ def _parts(
 
 def evidence_of(view: View) -> float:
     """Log evidence of a view's own model, each free number's prior worth one sample."""
-    products = Evidence.of(view, force_columns(view, []), [view.disturbance]).products[0]
+    products = _own(view)
     return products.log_evidence([]) - 0.5 * (products.known - 1) * float(np.log(products.samples))
+
+
+def whole_evidence(view: View) -> float:
+    """Log evidence of a view's own model beside its candidates, as `Evidence.best` has it with none of them."""
+    return _own(view).log_evidence([])
+
+
+def _own(view: View) -> Products:
+    return Evidence.of(view, force_columns(view, []), [view.disturbance]).products[0]

@@ -10,19 +10,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import AbstractEffect
-from .ahead import Ahead, proved
+from .ahead import Ahead, lacking, proved
+from .evidence import evidence_of, whole_evidence
 from .examine import listed, weighed
 from .model import p_value
-from .name import Named, refitted
+from .name import Named, named_on, refitted, standing
 from .selector import SIGNIFICANCE
 from .show import Luck, luck
-from .trial import Model, Trial, Tries, borne_out, refitted_all, worth_trying
-from .verdict import CERTAIN, NOTHING, Judged, both, by_all, helped, judge, settled
+from .trial import Model, Trial, Tries, upright, worth_trying
+from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
 
 # effects beyond which no more are sought, and sets that may be refused
 _MANY, _REFUSALS = 16, 2
-# rivals of what is not certain, tried in its place once all others are there
-_ANEW = 2
+# of log evidence, what may be less and yet be tried in the place of a name, and how many are
+_CLOSE, _ANEW = 3.0, 2
+# of what a name explains, the share that a linear picture without it may lose
+_LOST = 0.1
 
 
 def by_what_comes_next(
@@ -52,7 +55,7 @@ def by_what_comes_next(
         judged = both(judged, dataclasses.replace(said, named=[], notes=[]))
         best, named, refused = grown
         fallen |= refused
-    best, named = _asked_again(ahead, start, best, named)
+        best, named = _asked_again(ahead, start, best, named, vocabulary)
     best, named, gains = asked_for(ahead, start, best, named)
     whole = proved(trial, base, best) if named else None
     if whole is None:
@@ -74,29 +77,60 @@ def _grown(
     """
     before = tries.model([])
     for some in [chosen, chosen[:1]][: len(chosen)]:
-        kept = borne_out(tries, some)
-        more = [*named, *refitted_all(tries, kept, ())]
-        model, stand, _ = asked_for(ahead, start, tries.model([*kept]), more)
+        kept = upright(tries, some)
+        more = [*named, *standing(tries.found.selector, kept)]
+        model, stand, _ = asked_for(ahead, start, tries.model(kept), more)
         if luck(before.shown, model.shown, model.stands, freely=False).helps:
             return model, stand, {one.effect.label for one in more} - {one.effect.label for one in stand}
     return None
 
 
-def _asked_again(ahead: Ahead, start: Model, best: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
-    """The model with a rival in the place of what is not certain, where that is more probable beside all others."""
+def _asked_again(
+    ahead: Ahead,
+    start: Model,
+    best: Model,
+    named: Sequence[Named],
+    vocabulary: tuple[type[AbstractEffect], ...] | None,
+) -> tuple[Model, list[Named]]:
+    """The model with another in the place of a name, where that is more probable beside all others.
+
+    What was taken first may have stood in for what came after it, and others may do better beside that.
+    """
     said = []
     for one in named:
+        one, others = _beside(ahead, start, best, one, vocabulary)
         models = [(one.effect, best)]
-        there = {effect.label for effect in best.added}
-        rivals = [rival for rival, _ in one.rivals[:_ANEW] if rival.label not in there]
-        if one.probability < CERTAIN:
-            models += [(rival, ahead.instead(start, best, one.effect.label, rival)) for rival in rivals]
+        models += [(rival, ahead.instead(start, best, one.effect.label, rival)) for rival in others]
         models = [(effect, model) for effect, model in models if model.stands] or models[:1]
-        values = [(effect, -float(model.fit.cost)) for effect, model in models]
+        values = [(effect, evidence_of(model.view)) for effect, model in models]
         place = int(np.argmax([value for _, value in values]))
         best = models[place][1]
         said.append(refitted(dataclasses.replace(one, effect=models[place][0]), values))
     return best, said
+
+
+def _beside(
+    ahead: Ahead, start: Model, best: Model, one: Named, vocabulary: tuple[type[AbstractEffect], ...] | None
+) -> tuple[Named, list[AbstractEffect]]:
+    """How probable a named effect is beside all others of a model, and what may stand in its place, the best first.
+
+    Asked of a linear picture without it, or, where that does not even give back what was taken from it, of a model.
+    """
+    whole = whole_evidence(best.view)
+    for view in (lambda: lacking(best.view, one.effect), lambda: ahead.instead(start, best, one.effect.label).view):
+        selector = listed(view(), vocabulary)
+        selector.lose_free_run()
+        scan = selector.scan([])
+        own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
+        number = max(own, key=lambda i, value=scan.value: value[i])
+        without, again = (selector.evidence.best(selector.columns(some))[0] for some in ([], [number]))
+        if np.isfinite(scan.value[number]) and whole - again < _LOST * (whole - without):
+            break
+    if not np.isfinite(scan.value[number]):
+        return one, []
+    close = [i for i in np.argsort(-scan.value) if scan.value[i] > scan.value[number] - _CLOSE and i not in own]
+    others = {scan.effects[i].label: scan.effects[i] for i in reversed(close)}
+    return named_on(selector, [], number), [*reversed(others.values())][:_ANEW]
 
 
 def asked_for(

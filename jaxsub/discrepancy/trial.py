@@ -209,14 +209,20 @@ def borne_out(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
 
     With one of two alone the coefficients take up the other, so all are fitted first.
     """
-    while unsound := tries.unsound(chosen) if chosen else []:
-        # of two that trade with each other neither is told, and one may be there
-        chosen = [i for i in chosen if i not in unsound] or [i for i in chosen if i != unsound[0]]
+    chosen = upright(tries, chosen)
     kept: dict[int, Fits] = {}
     for place, index in enumerate(chosen):
         fits = tries.closest([*kept, *chosen[place + 1 :]], index)
         kept[fits[0][0]] = fits
     return kept
+
+
+def upright(tries: Tries, chosen: Sequence[int]) -> Sequence[int]:
+    """As many of `chosen` as come out of their fit together as physics admits, each told beside the others."""
+    while unsound := tries.unsound(chosen) if chosen else []:
+        # of two that trade with each other neither is told, and one may be there
+        chosen = [i for i in chosen if i not in unsound] or [i for i in chosen if i != unsound[0]]
+    return chosen
 
 
 def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:

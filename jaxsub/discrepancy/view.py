@@ -84,7 +84,7 @@ class View:
     - `runs`, `sigma`: the recordings and their noise, SI.
     - `followed`: the runs as the model's filter followed them. `disturbance`: under which it did.
     - `path`: its motion. `base`: the residual's column and those of the free parameters, each of unit length under
-      `disturbance`; `prior`: (p + 1, p + 1) of them.
+      `disturbance`; `prior`: (p + 1, p + 1) of them. `length`: (p,) what each was divided by.
     """
 
     vehicle: AbstractVehicle
@@ -96,6 +96,7 @@ class View:
     path: Trajectory
     base: Columns
     prior: Float[Array, "p1 p1"]
+    length: np.ndarray
 
     @property
     def finite(self) -> bool:
@@ -159,7 +160,7 @@ def _seen(led: Led, at: At) -> View:
     runs, sigma = led.problem.runs, led.problem.sigma
     path = Trajectory.of(at.vehicle, runs, at.followed.expected, at.followed.filtered)
     covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
-    return View(at.vehicle, covariance, runs, sigma, at.followed, at.disturbance, path, at.base, at.prior)
+    return View(at.vehicle, covariance, runs, sigma, at.followed, at.disturbance, path, at.base, at.prior, at.length)
 
 
 def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturbance, list[Disturbance]]:

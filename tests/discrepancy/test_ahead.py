@@ -8,8 +8,9 @@ import numpy as np
 from rigs import oscillator
 
 from jaxsub.discrepancy import batch
-from jaxsub.discrepancy.ahead import Ahead, less, pieces_of
+from jaxsub.discrepancy.ahead import Ahead, lacking, less, pieces_of
 from jaxsub.discrepancy.evidence import evidence_of
+from jaxsub.discrepancy.leading import Led, of_order
 from jaxsub.discrepancy.many import asked_for, by_what_comes_next
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.show import begun_anew, hold
@@ -18,8 +19,8 @@ from jaxsub.discrepancy.view import led_from
 from jaxsub.effects import CubicStiffness, numbers
 from jaxsub.effects.actuator_curves import ActuatorDeadband
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
-from jaxsub.estimate import evaluate, initial_guess
-from jaxsub.likelihood import Disturbance
+from jaxsub.estimate import Problem, evaluate, initial_guess
+from jaxsub.likelihood import Disturbance, whitened_squares
 from jaxsub.recording import Recording
 from jaxsub.results import RESULTS
 
@@ -114,6 +115,24 @@ def test_a_vehicle_without_an_effect_has_the_numbers_that_fit_best_without_it():
     others = [i for i, name in enumerate(names) if name != "cubic-stiffness[x].k_3"]
     scale = np.sqrt(np.diag(np.linalg.inv(view.covariance)))
     assert np.max(np.abs(gradient / scale)[others]) < 1e-6 * np.max(np.abs(gradient / scale))
+
+
+def test_a_view_that_lacks_an_effect_is_that_of_the_vehicle_without_it():
+    """Claim: of a small effect the residual's squares are those of a filter without it."""
+    vehicle, runs = true_pendulum().with_effect(CubicDamping("x", jnp.asarray(0.0))), batch(pendulum(), steered()[:2])
+    view = led_from(vehicle, runs, SIGMA, [dataclasses.replace(STILL, force=jnp.array([1.0]))])
+    effect = view.vehicle.effects[-1]
+    fewer = lacking(view, effect)
+    problem = of_order(Problem.of(fewer.vehicle, runs, SIGMA))
+    anew = Led(problem, problem.guess).at(fewer.vehicle, view.disturbance)
+    before, there, expected = (squares(one) for one in (view, fewer, anew))
+    assert abs(numbers(effect)["coefficient"]) > 1e-4
+    assert abs(there - expected) < 0.05 * abs(expected - before)
+
+
+def squares(at) -> float:
+    """χ² of a residual as it stands."""
+    return float(whitened_squares(at.disturbance, at.followed.system, at.base)[0])
 
 
 @cache
