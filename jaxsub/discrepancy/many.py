@@ -103,9 +103,12 @@ def _asked_again(
         models += [(rival, ahead.instead(start, best, one.effect.label, rival)) for rival in others]
         models = [(effect, model) for effect, model in models if model.stands] or models[:1]
         values = [(effect, evidence_of(model.view)) for effect, model in models]
-        place = int(np.argmax([value for _, value in values]))
-        best = models[place][1]
-        said.append(refitted(dataclasses.replace(one, effect=models[place][0]), values))
+        effect, model = models[int(np.argmax([value for _, value in values]))]
+        if model is best:
+            said.append(refitted(one, values))
+        else:
+            best = model
+            said.append(_beside(ahead, start, best, dataclasses.replace(one, effect=effect), vocabulary)[0])
     return best, said
 
 
