@@ -14,7 +14,7 @@ from .ahead import Ahead, lacking, proved
 from .evidence import evidence_of, whole_evidence
 from .examine import listed, weighed
 from .model import p_value
-from .name import Named, named_on, refitted, standing
+from .name import Named, asked_still, named_on, refitted, standing
 from .selector import SIGNIFICANCE
 from .show import Luck, luck
 from .trial import Model, Trial, Tries, upright, worth_trying
@@ -131,9 +131,12 @@ def _beside(
             break
     if not np.isfinite(scan.value[number]):
         return one, []
-    close = [i for i in np.argsort(-scan.value) if scan.value[i] > scan.value[number] - _CLOSE and i not in own]
-    others = {scan.effects[i].label: scan.effects[i] for i in reversed(close)}
-    return named_on(selector, [], number), [*reversed(others.values())][:_ANEW]
+    close = (scan.value > scan.value[number] - _CLOSE) & ~asked_still(selector, [], number, scan)
+    close[own] = False
+    others: dict[str, AbstractEffect] = {}
+    for i in (i for i in np.argsort(-scan.value) if close[i]):
+        others.setdefault(scan.effects[i].label, scan.effects[i])
+    return named_on(selector, [], number), [*others.values()][:_ANEW]
 
 
 def asked_for(

@@ -10,6 +10,7 @@ import dataclasses
 from collections.abc import Collection, Sequence
 
 import numpy as np
+from jaxtyping import Bool
 from scipy import special
 
 from ..effects import AbstractEffect, numbers
@@ -145,11 +146,8 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     scan = selector.scan(others)
     out = {selector.candidates[i].name for i in refused} - {selector.candidates[index].name}
     may = selector.stand_in(others, index) & np.array([effect.name not in out for effect in selector.candidates])
-    # where many are missing another may do as much and be no rival: with the one in the model it is asked for still
     if index not in selector.freely:
-        beside = selector.scan([*others, index])
-        asked = np.array([selector.p_value(i, beside) < SIGNIFICANCE for i in range(len(may))])
-        may &= ~(asked & (beside.statistic > _ASKED_STILL * scan.statistic))
+        may &= ~asked_still(selector, others, index, scan)
     may[index] = True
     log = np.where(may, scan.value, -np.inf)
     weights = special.softmax(log)
@@ -173,6 +171,16 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     near = [j for j in near if alike(j)]
     twins = sorted(near, key=lambda j: -log[j])[:_TWINS]
     return Named(index, scan.effects[index], min(1.0, by_name[own]), sorted(rivals, key=lambda rival: -rival[1]), twins)
+
+
+def asked_still(selector: Selector, others: Sequence[int], index: int, scan: Scan) -> Bool[np.ndarray, " m"]:
+    """(m,) whether each candidate of a `scan` on top of `others` is asked for still with `index` in the model.
+
+    Where many are missing another may do as much and be no rival.
+    """
+    beside = selector.scan([*others, index])
+    asked = np.array([selector.p_value(i, beside) < SIGNIFICANCE for i in range(len(beside.value))])
+    return asked & (beside.statistic > _ASKED_STILL * scan.statistic)
 
 
 def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Named:

@@ -1,12 +1,10 @@
 """What is a twin of a name, to be fitted beside it, and what is a rival."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from jaxsub.discrepancy.name import named_on, refitted
-from jaxsub.discrepancy.selector import Selector
+from jaxsub.discrepancy.selector import Scan, Selector
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 
 
@@ -16,7 +14,7 @@ class Scanned(Selector):
     def __init__(self, statistics, left=0.1, **effects):
         self.candidates, self.kept, self.freely = list(effects.values()), np.ones(len(effects)), set()
         one = np.array(statistics)
-        seen = lambda statistic: SimpleNamespace(effects=self.candidates, statistic=statistic, value=0.5 * statistic)
+        seen = lambda statistic: Scan(0.5 * statistic, statistic, self.candidates, statistic > 0.0)
         self.scan = lambda others: seen(left * one if others else one)
         self.p_value = lambda index, scan: np.exp(-0.5 * scan.statistic[index])
         self.stand_in = lambda others, index: np.ones(len(effects), bool)
