@@ -80,3 +80,19 @@ def test_numbers_that_the_recordings_do_not_tell_are_of_the_order_of_the_files()
         at = [row.name for row in vehicle.layout.free].index("B_x_drive")
         assert float(led.vehicle.values()["B_x_drive"]) == pytest.approx(2.0)
         assert np.sqrt(led.covariance[at, at]) == pytest.approx(spread, rel=1e-3)
+
+
+def test_a_step_is_the_least_within_its_bounds():
+    """Claim: no point within bounds leaves less than the step, one that is only cut off at them leaves more, and
+    without bounds it is that of the normal equations."""
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((40, 4)) + 2.0 * rng.standard_normal((40, 1))
+    gram = (whole := np.column_stack([columns @ [3.0, -2.0, 1.0, 0.5], columns])).T @ whole
+    left = lambda step: step @ gram[1:, 1:] @ step - 2.0 * step @ gram[1:, 0]
+    free = leading._step(gram, 0.0, np.full(4, -np.inf), np.full(4, np.inf))
+    assert free == pytest.approx([3.0, -2.0, 1.0, 0.5])
+    low, high = np.full(4, -1.0), np.full(4, 1.0)
+    step = leading._step(gram, 0.0, low, high)
+    assert np.all((step >= low) & (step <= high))
+    assert left(step) < left(np.clip(free, low, high)) - 1.0
+    assert all(left(step) <= left(point) for point in rng.uniform(low, high, (2000, 4)))
