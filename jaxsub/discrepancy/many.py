@@ -11,7 +11,7 @@ import numpy as np
 
 from ..effects import AbstractEffect
 from .ahead import Ahead, lacking, proved
-from .evidence import evidence_of, whole_evidence
+from .evidence import whole_evidence
 from .examine import listed, weighed
 from .model import p_value
 from .name import Named, asked_still, named_on, refitted, standing
@@ -102,7 +102,7 @@ def _asked_again(
         models = [(one.effect, best)]
         models += [(rival, ahead.instead(start, best, one.effect.label, rival)) for rival in others]
         models = [(effect, model) for effect, model in models if model.stands] or models[:1]
-        values = [(effect, evidence_of(model.view)) for effect, model in models]
+        values = [(effect, -float(model.fit.cost)) for effect, model in models]
         effect, model = models[int(np.argmax([value for _, value in values]))]
         if model is best:
             said.append(refitted(one, values))
