@@ -10,3 +10,7 @@ class RESULTS(optx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
     nan_start = "The model does not run from these starting values: a residual is not finite there."
     indefinite_inertia = "The fitted inertia matrix is not positive definite."
     not_stationary = "The search stopped where the gradient is not small: more steps or another start are needed."
+
+
+# to a checker of types a member is not of its enumeration, and what `promote` returns is
+SUCCESSFUL = RESULTS.promote(optx.RESULTS.successful)

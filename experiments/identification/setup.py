@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxsub.control import scenario_one, scenario_two
 from jaxsub.discrepancy import batch
-from jaxsub.estimate import Fit, Found, Problem, evaluate
+from jaxsub.estimate import Ended, Fit, Found, Problem, evaluate
 from jaxsub.recording import Recording
 from jaxsub.simulate import at_rest
 from jaxsub.vehicle import AbstractVehicle
@@ -58,8 +58,8 @@ def problem(vehicle: AbstractVehicle, recorded: Sequence[Recording]) -> Problem:
 def fitted(problem: Problem, found: Found) -> Fit:
     """The fit where one search ended."""
     vehicle, states = problem.split(found.y)
-    told = {"cost": found.cost, "steps": found.evaluations, "result": found.result}
-    return evaluate(vehicle, problem.runs, states, problem.sigma, **told, known_start=True)
+    told = found.cost, found.evaluations, found.result
+    return evaluate(Ended(vehicle, problem.runs, states, problem.sigma, *told, known_start=True))
 
 
 def relative_errors(vehicle: AbstractVehicle, true: AbstractVehicle) -> dict[str, float]:

@@ -62,7 +62,7 @@ def part(name: str, out: Path, quick: bool) -> dict:
 def _fitted(vehicle: AbstractVehicle, recording: Recording) -> tuple[AbstractVehicle, float]:
     """The vehicle fitted to a recording, and χ²."""
     found = search(vehicle, batch(vehicle, [recording]))
-    return found[0], 2.0 * float(found[3])
+    return found.vehicle, 2.0 * float(found.cost)
 
 
 def _row(made: Case, models: list[AbstractVehicle], recording: Recording, seeds: range) -> dict:

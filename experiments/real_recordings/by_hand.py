@@ -36,6 +36,6 @@ def by_hand(case: Case, folder: Path) -> dict:
 def free_run_errors(vehicle: AbstractVehicle, recordings: Sequence[Recording], sigma: Array) -> list[np.ndarray]:
     """Measured less modelled (SI, one (K, c) array a recording); only initial states are found from them."""
     runs = batch(vehicle, recordings)
-    _, start, *_ = search(vehicle, runs, sigma=sigma, moving=False)
+    start = search(vehicle, runs, sigma=sigma, moving=False).start
     errors = np.asarray(output_errors(vehicle, runs, start))
     return [error[: len(recording.times)] for error, recording in zip(errors, recordings, strict=True)]

@@ -120,5 +120,5 @@ def whole_tests(vehicle: AbstractVehicle, split: dict[str, Recording]) -> dict[s
 def free_run_error(vehicle: AbstractVehicle, whole: Recording) -> np.ndarray:
     """Measured less simulated (V), the initial state found from the first stretch alone."""
     first = whole.select(np.arange(len(whole.times)) < _SKIPPED)
-    _, start, *_ = search(vehicle, batch(vehicle, [first]), sigma=jnp.array([1e-3]), moving=False)
+    start = search(vehicle, batch(vehicle, [first]), sigma=jnp.array([1e-3]), moving=False).start
     return whole.column("y") - np.asarray(predict(vehicle, batch(vehicle, [whole]), start))[0, :, 0]

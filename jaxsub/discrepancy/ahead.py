@@ -14,9 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..effects import AbstractEffect, amplitudes
-from ..estimate import evaluate, initial_guess
+from ..estimate import Ended, initial_guess
 from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
-from ..results import RESULTS
+from ..results import SUCCESSFUL
 from ..vehicle import AbstractVehicle
 from .evidence import evidence_of
 from .model import freed, joined, places
@@ -82,10 +82,10 @@ class Ahead:
         return luck(fewer, best.shown, True, freely=False)
 
     def _model(self, model: Model, view: View, effects: Sequence[AbstractEffect]) -> Model:
-        start = initial_guess(view.vehicle, view.runs)[0]
-        ended = {"cost": jnp.asarray(-evidence_of(view)), "steps": jnp.asarray(0), "result": RESULTS.successful}
-        fit = evaluate(view.vehicle, view.runs, start, view.sigma, **ended)
-        return Model(fit, view, self._shown(model.shown, view, view.vehicle), (*model.added, *effects))
+        start, _ = initial_guess(view.vehicle, view.runs)
+        cost = jnp.asarray(-evidence_of(view))
+        ended = Ended(view.vehicle, view.runs, start, view.sigma, cost, jnp.asarray(0), SUCCESSFUL)
+        return Model(ended, view, self._shown(model.shown, view, view.vehicle), (*model.added, *effects))
 
     def _shown(self, shown: HeldOut, view: View, vehicle: AbstractVehicle) -> HeldOut:
         """What `shown` is with what a `vehicle` expects under the disturbance of a view."""
@@ -167,7 +167,6 @@ def pieces_of(view: View) -> int | None:
 def in_pieces(trial: Trial, model: Model, pieces: int) -> Model:
     """A model with its view's numbers, whose free runs are begun anew in every piece from what its filter says."""
     view = model.view
-    ended = {"cost": model.fit.cost, "steps": model.fit.steps, "result": RESULTS.successful}
-    start = starts(view.followed, pieces)
-    fit = evaluate(view.vehicle, view.runs.segments(pieces), start, view.sigma, **ended)
-    return Model(fit, view, trial.held_out(fit, view.disturbance, pieces), model.added)
+    runs, start = view.runs.segments(pieces), starts(view.followed, pieces)
+    ended = Ended(view.vehicle, runs, start, view.sigma, model.fit.cost, model.fit.steps, SUCCESSFUL)
+    return Model(ended, view, trial.held_out(ended, view.disturbance, pieces), model.added)

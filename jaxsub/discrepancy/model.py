@@ -8,7 +8,7 @@ import numpy as np
 from scipy import special
 
 from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, numbers, with_numbers
-from ..estimate import Fit, evaluate, search
+from ..estimate import Ended, Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .leading import by_cost
@@ -23,7 +23,7 @@ _NO_COLUMN = 1e-100
 
 def join(
     view: View,
-    fit: Fit,
+    fit: Ended,
     effects: Sequence[AbstractEffect],
     file: AbstractVehicle,
     near: Sequence[AbstractVehicle] = (),
@@ -49,10 +49,9 @@ def join(
     return by_cost(fits)[0]
 
 
-def freed(fit: Fit, start: AbstractVehicle) -> Fit:
+def freed(fit: Ended, start: AbstractVehicle) -> Fit:
     """The fit of `start` to the runs of a fit."""
-    vehicle, states, sigma, cost, steps, result = search(start, fit.runs, sigma=fit.sigma)
-    return evaluate(vehicle, fit.runs, states, sigma, cost=cost, steps=steps, result=result)
+    return evaluate(search(start, fit.runs, sigma=fit.sigma))
 
 
 def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: float) -> AbstractVehicle:
@@ -63,7 +62,7 @@ def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: f
     return vehicle
 
 
-def sound(fit: Fit, effects: Sequence[AbstractEffect]) -> bool:
+def sound(fit: Ended, effects: Sequence[AbstractEffect]) -> bool:
     """Whether all of `effects` came out of a fit with signs that physics admits, and none of them vanished.
 
     A force whose memory is over within a sample is one without: what it then does, coefficients do. One whose memory
@@ -107,6 +106,7 @@ def places(view: View, effect: AbstractEffect) -> list[int]:
     return [names.index(f"{effect.label}.{symbols[name]}") for name in amplitudes(effect) or symbols]
 
 
-def allowing_for(view: View, fit: Fit) -> Fit:
-    """A fit with errors of its numbers that allow for the disturbance that its view has."""
+def allowing_for(view: View, ended: Ended) -> Fit:
+    """The fit where a search ended, with errors of its numbers that allow for the disturbance that its view has."""
+    fit = evaluate(ended)
     return dataclasses.replace(fit, covariance=coloured_covariance(fit, view.disturbance).covariance)

@@ -24,7 +24,7 @@ def next_run(diagnosis: Diagnosis, train: Sequence[Recording]) -> Manoeuvre | No
     if len(models) < 2 or not models[0].layout.held:
         return None
     sigma = jnp.asarray([channel.sigma for channel in diagnosis.channels])
-    fitted = [search(model, batch(model, train), sigma=sigma)[0] for model in models]
+    fitted = [search(model, batch(model, train), sigma=sigma).vehicle for model in models]
     return separating_manoeuvre(fitted, train[0], sigma, duration=min(train[0].duration, _LONGEST))
 
 

@@ -63,7 +63,7 @@ def hold(
     for count, taken in _batches(runs, chosen, size):
         start, spread = initial_guess(vehicle, taken)
         if pieces == 1:
-            _, start, *_ = search(vehicle, taken, sigma=sigma, moving=False)
+            start = search(vehicle, taken, sigma=sigma, moving=False).start
         followed = follow(vehicle, taken, sigma, disturbance, start, spread)
         shown = predict(vehicle, taken, start) if pieces == 1 else begun_anew(vehicle, followed, taken, pieces)
         predicted += list(np.asarray(shown)[:count])

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array
 
 from ..effects import AbstractEffect
-from ..estimate import Fit
+from ..estimate import Ended
 from ..likelihood import Disturbance
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
@@ -58,9 +58,9 @@ class Found:
 
 
 class Model(NamedTuple):
-    """A fit, its view, what it shows on the held-out runs, and the effects that were added to the baseline."""
+    """Where a search ended, its view, what it shows on the held-out runs, and the effects added to the baseline."""
 
-    fit: Fit
+    fit: Ended
     view: View
     shown: HeldOut
     added: tuple[AbstractEffect, ...]
@@ -106,7 +106,7 @@ class Trial:
         view = look(joined, disturbance)
         return Model(joined, view, self.held_out(joined, view.disturbance), (*model.added, *effects))
 
-    def held_out(self, fit: Fit, disturbance: Disturbance, pieces: int = 1) -> HeldOut:
+    def held_out(self, fit: Ended, disturbance: Disturbance, pieces: int = 1) -> HeldOut:
         """A fit's vehicle on them, each cut into `pieces`."""
         return hold(
             fit.vehicle, self.all_runs(fit.runs.substeps), self.chosen, self.size, self.sigma, disturbance, pieces

@@ -4,7 +4,7 @@ from .combined import Chain, Global
 from .disturbance import estimate_disturbance
 from .ends import Ends, ends
 from .filtered import Filtered
-from .fit import Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
+from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
 from .method import AbstractMethod, Found, Iterative, share_for
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .posterior import posterior
@@ -17,6 +17,7 @@ __all__ = [
     "AbstractMethod",
     "Basin",
     "Chain",
+    "Ended",
     "Ends",
     "Expansion",
     "Filtered",

@@ -20,31 +20,29 @@ from .problem import Problem
 _CONCENTRATIONS = 12
 
 
-class Fit(eqx.Module):
-    """What an estimation found.
+class Ended(eqx.Module):
+    """Where a search ended, without any statistics.
 
     **Fields**
 
-    - `vehicle`: with the fitted numbers. `start`: (R, s) fitted initial states. `sigma`: (c,) noise, SI.
-    - `names`, `covariance`: of the p free parameters, physical units; the initial states' uncertainty is included.
-    - `model`: the vehicle linearised along the fitted trajectory.
-    - `cost`: ½ Σ whitened residuals², priors included. `gradient_norm`: largest |∂cost/∂y| in scaled coordinates,
-      relative to the largest curvature's square root: how many standard errors the optimum may still be away.
-    - `steps`: evaluations by the search. `result`: a `RESULTS` value. `known_start`: whether `start` was given.
+    - `vehicle`: with the numbers found. `start`: (R, s) initial states. `sigma`: (c,) noise, SI.
+    - `cost`: ½ Σ whitened residuals², priors included. `steps`: evaluations by the search. `result`: a `RESULTS` value.
+    - `known_start`: whether `start` was given.
     """
 
     vehicle: AbstractVehicle
     runs: Runs
     start: Float[Array, "r s"]
     sigma: Float[Array, " c"]
-    covariance: Float[Array, "p p"]
-    model: Linearised
     cost: Float[Array, ""]
-    gradient_norm: Float[Array, ""]
     steps: Array
     result: RESULTS
-    names: tuple[str, ...] = eqx.field(static=True)
-    known_start: bool = eqx.field(static=True)
+    known_start: bool = eqx.field(static=True, default=False, kw_only=True)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the p free parameters."""
+        return tuple(row.name for row in self.vehicle.layout.free)
 
     @property
     def values(self) -> dict[str, float]:
@@ -53,15 +51,31 @@ class Fit(eqx.Module):
         return {name: float(values[name]) for name in self.names}
 
     @property
+    def problem(self) -> Problem:
+        """The least-squares problem of which this is the optimum."""
+        start = self.start if self.known_start else None
+        return Problem.of(self.vehicle, self.runs, self.sigma, start, known_start=self.known_start)
+
+
+class Fit(Ended):
+    """What an estimation found.
+
+    **Fields** beside those of `Ended`
+
+    - `covariance`: of the p free parameters, physical units; the initial states' uncertainty is included.
+    - `model`: the vehicle linearised along the fitted trajectory.
+    - `gradient_norm`: largest |∂cost/∂y| in scaled coordinates, relative to the largest curvature's square root: how
+      many standard errors the optimum may still be away.
+    """
+
+    covariance: Float[Array, "p p"]
+    model: Linearised
+    gradient_norm: Float[Array, ""]
+
+    @property
     def standard_errors(self) -> dict[str, float]:
         """Their standard errors."""
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
-
-    @property
-    def problem(self) -> Problem:
-        """The least-squares problem at whose optimum this is."""
-        start = self.start if self.known_start else None
-        return Problem.of(self.vehicle, self.runs, self.sigma, start, known_start=self.known_start)
 
     @property
     def residual(self) -> Float[Array, "r k c"]:
@@ -89,8 +103,8 @@ def search(
     start: Array | None = None,
     moving: bool = True,
     known_start: bool = False,
-) -> tuple[AbstractVehicle, Array, Array, Array, Array, RESULTS]:
-    """The maximum-likelihood vehicle, initial states, noise, cost, evaluations and result, without any statistics.
+) -> Ended:
+    """The maximum-likelihood vehicle, initial states and noise.
 
     `method` is Gauss–Newton where none is given. `known_start` takes the initial states `start` for the truth. `moving`
     false keeps the vehicle and finds the initial states alone, as a run that the fit did not see asks for.
@@ -119,7 +133,7 @@ def search(
         problem = dataclasses.replace(problem, sigma=jnp.where(estimated & (rms > 0.0), rms, problem.sigma))
         if settled:
             break
-    return fitted, states, problem.sigma, cost, total, result
+    return Ended(fitted, runs, states, problem.sigma, cost, total, result, known_start=known_start)
 
 
 @eqx.filter_jit
@@ -173,10 +187,7 @@ def _fitted(
     start: Array | None,
     known_start: bool,
 ) -> Fit:
-    fitted, states, noise, cost, steps, result = search(
-        vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start
-    )
-    return evaluate(fitted, runs, states, noise, cost=cost, steps=steps, result=result, known_start=known_start)
+    return evaluate(search(vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start))
 
 
 def _improbable(found: Fit) -> float:
@@ -185,24 +196,15 @@ def _improbable(found: Fit) -> float:
     return value if np.isfinite(value) else np.inf
 
 
-def evaluate(
-    vehicle: AbstractVehicle,
-    runs: Runs,
-    start: Array,
-    sigma: Array,
-    *,
-    cost: Array,
-    steps: Array,
-    result: RESULTS,
-    known_start: bool = False,
-) -> Fit:
-    """The `Fit` of a vehicle that a search has already found."""
-    model = linearise(vehicle, runs, start)
-    names = tuple(row.name for row in vehicle.layout.free)
-    problem = Problem.of(vehicle, runs, sigma, start if known_start else None, known_start=known_start)
-    covariance, gradient = _statistics(problem, model)
-    result = judged(vehicle, gradient, result)
-    return Fit(vehicle, runs, start, sigma, covariance, model, cost, gradient, steps, result, names, known_start)
+def evaluate(ended: Ended) -> Fit:
+    """The `Fit` where a search ended; itself where it is one."""
+    if isinstance(ended, Fit):
+        return ended
+    model = linearise(ended.vehicle, ended.runs, ended.start)
+    covariance, gradient = _statistics(ended.problem, model)
+    told = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
+    told["result"] = judged(ended.vehicle, gradient, ended.result)
+    return Fit(**told, covariance=covariance, model=model, gradient_norm=gradient)
 
 
 @eqx.filter_jit

@@ -12,9 +12,9 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Float, Int, PyTree
 
-from ..results import RESULTS
+from ..results import RESULTS, SUCCESSFUL
 
-_SUCCESSFUL, _NONFINITE = RESULTS.promote(optx.RESULTS.successful), RESULTS.promote(optx.RESULTS.nonfinite)
+_NONFINITE = RESULTS.promote(optx.RESULTS.nonfinite)
 _UNFINISHED = RESULTS.promote(optx.RESULTS.nonlinear_max_steps_reached)
 
 
@@ -63,7 +63,7 @@ def pool(
         done, result = solver.terminate(with_aux, y, own, {}, state, frozenset())
         steps = lane.steps + 1
         result = RESULTS.where(jnp.all(jnp.isfinite(y)), RESULTS.promote(result), _NONFINITE)
-        done = done | (result != _SUCCESSFUL)
+        done = done | (result != SUCCESSFUL)
         result = RESULTS.where(done, result, _UNFINISHED)
         return _Lane(lane.index, y, state, steps), done | (steps >= max_steps), result
 
@@ -86,5 +86,5 @@ def pool(
         return jnp.any(carry[0].index < count)
 
     nothing = jnp.zeros(count, jnp.asarray(0).dtype)
-    blank = Ends(jnp.zeros_like(starts), nothing, jax.vmap(lambda _: _SUCCESSFUL)(nothing))
+    blank = Ends(jnp.zeros_like(starts), nothing, jax.vmap(lambda _: SUCCESSFUL)(nothing))
     return jax.lax.while_loop(unfinished, body, (dynamic, jnp.asarray(width), blank))[2]

@@ -20,11 +20,11 @@ def answered(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> list[
     **Raises** `InputError` where the model does not run from the file's values.
     """
     runs = batch(vehicle, recordings)
-    fitted, states, _, cost, *_ = search(vehicle, runs)
-    if not np.isfinite(float(cost)):
+    found = search(vehicle, runs)
+    if not np.isfinite(float(found.cost)):
         what = "the model does not run from these values on " + ", ".join(r.name for r in recordings)
         raise InputError(vehicle.layout.name, what, "give values that are closer")
-    shown, made = np.asarray(predict(fitted, runs, states)), []
+    shown, made = np.asarray(predict(found.vehicle, runs, found.start)), []
     for recording, answer in zip(recordings, shown, strict=True):
         columns = dict(recording.columns)
         for channel, values in zip(vehicle.layout.channels, answer.T, strict=True):

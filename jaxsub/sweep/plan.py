@@ -118,13 +118,14 @@ class Plan:
             return self
         sigma = []
         for (name, recorded), problem in zip(self.cases, self.problems, strict=True):
-            found = problem.sigma
+            known = problem.sigma
             if any(output.sigma is None for output in problem.vehicle.layout.outputs):
-                _, _, found, cost, *_ = search(problem.vehicle, problem.runs)
-                if not bool(jnp.isfinite(cost)):
+                found = search(problem.vehicle, problem.runs)
+                if not bool(jnp.isfinite(found.cost)):
                     what = f"sigma is to be estimated and the model does not run on {recorded} from these values"
                     raise InputError(f"sweep: vehicle {name}", what, "give sigma, or values that are closer")
-            sigma.append(tuple(np.asarray(found).tolist()))
+                known = found.sigma
+            sigma.append(tuple(np.asarray(known).tolist()))
         return dataclasses.replace(self, sigma=tuple(sigma))
 
     def chunks(self) -> list[Chunk]:

@@ -4,12 +4,11 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 import xarray
 
 from ..estimate import MARGIN, Found, Rate, basins
 from ..estimate.method import problems
-from ..results import RESULTS
+from ..results import SUCCESSFUL
 from .plan import Plan
 from .run import OUTCOMES
 
@@ -75,7 +74,7 @@ def _basins(plan: Plan, index: int, case: xarray.Dataset) -> tuple[list, int]:
     y = np.asarray(first.coordinates)[:, : len(problem.coordinates())]
     cost, evaluations = (jnp.asarray(np.asarray(values)) for values in (first.cost, first.evaluations))
     own = problems(problem, plan.outputs(index, np.arange(1)))(jnp.asarray(0))
-    return basins(own, Found(jnp.asarray(y), cost, evaluations, RESULTS.promote(optx.RESULTS.successful)))
+    return basins(own, Found(jnp.asarray(y), cost, evaluations, SUCCESSFUL))
 
 
 def _coefficients(rows: list, case: xarray.Dataset, best: np.ndarray) -> dict[str, Any]:

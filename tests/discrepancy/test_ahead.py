@@ -19,7 +19,7 @@ from jaxsub.discrepancy.view import led_from
 from jaxsub.effects import CubicStiffness, numbers
 from jaxsub.effects.actuator_curves import ActuatorDeadband
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
-from jaxsub.estimate import Problem, evaluate, initial_guess
+from jaxsub.estimate import Ended, Problem, initial_guess
 from jaxsub.likelihood import Disturbance, whitened_squares
 from jaxsub.recording import Recording
 from jaxsub.results import RESULTS
@@ -142,8 +142,8 @@ def begun():
     train = runs.take([0, 1], 2)
     file = pendulum(D_x=0.35, K_x=-0.85, B_x_drive=1.8)
     view = led_from(file, train, SIGMA, [dataclasses.replace(STILL, force=jnp.array([1.0]))])
-    ended = {"cost": jnp.asarray(-evidence_of(view)), "steps": jnp.asarray(0), "result": RESULTS.nan_start}
-    fit = evaluate(view.vehicle, train, initial_guess(view.vehicle, train)[0], SIGMA, **ended)
+    start, cost = initial_guess(view.vehicle, train)[0], jnp.asarray(-evidence_of(view))
+    fit = Ended(view.vehicle, train, start, SIGMA, cost, jnp.asarray(0), RESULTS.nan_start)
     trial = Trial(runs, [2], 2, SIGMA, lambda message: None, file)
     return trial, Model(fit, view, trial.held_out(fit, view.disturbance), ())
 

@@ -28,7 +28,7 @@ from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.mechanisms import CoulombFriction
 from jaxsub.effects.sensors import SensorScale
-from jaxsub.estimate import Problem, evaluate, fit
+from jaxsub.estimate import Ended, Problem, evaluate, fit
 from jaxsub.results import RESULTS
 from jaxsub.vehicle import read_vehicle
 from jaxsub.vehicle.catalogue import dsrv
@@ -61,9 +61,9 @@ def astray(runs, share, *names):
     """A fit that ended with `share` of the file's numbers of those `names`."""
     values = wrong().values()
     sigma = jnp.array([output.sigma for output in wrong().layout.outputs])
-    start, ended = Problem.of(wrong(), runs, sigma).guess, {"cost": jnp.asarray(1e6), "steps": jnp.asarray(0)}
+    start = Problem.of(wrong(), runs, sigma).guess
     gone = wrong().with_values({name: share * values[name] for name in names})
-    return evaluate(gone, runs, start, sigma, **ended, result=RESULTS.successful)
+    return evaluate(Ended(gone, runs, start, sigma, jnp.asarray(1e6), jnp.asarray(0), RESULTS.successful))
 
 
 @pytest.mark.long

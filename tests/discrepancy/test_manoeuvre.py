@@ -117,7 +117,7 @@ def test_designed_inputs_separate_as_much_as_a_refit_says_and_more_than_every_st
     truth, rival = np.unravel_index(np.argmin(found.pairs), found.pairs.shape)
     start = jnp.asarray([[WEAK.column("x_rate")[0], WEAK.column("x")[0]]])
     (answer,) = synthetic(RIVALS[truth], [found.recording], seed=0, noise=False, start=start, states=sampled_states)
-    missed = 2.0 * float(search(RIVALS[rival], batch(RIVALS[rival], [answer]), sigma=jnp.asarray(SIGMA))[3])
+    missed = 2.0 * float(search(RIVALS[rival], batch(RIVALS[rival], [answer]), sigma=jnp.asarray(SIGMA)).cost)
     # the expectation is linear in the change of the rival's numbers, the refit is not
     np.testing.assert_allclose(missed, found.separation, rtol=0.25)
 

@@ -107,9 +107,11 @@ def test_start_that_does_not_run_is_a_result_and_no_exception(found):
 
 def test_search_of_the_initial_states_alone_keeps_the_vehicle(found):
     vehicle = oscillator().with_values({"K_x": jnp.asarray(4.4)})
-    kept, start, *_ = search(vehicle, found.runs, moving=False)
-    assert {name: float(kept.values()[name]) for name in NAMES} == pytest.approx(TRUTH | {"K_x": 4.4}, rel=1e-12)
-    assert np.abs(start - initial_guess(vehicle, found.runs)[0]).max() > 1e-4
+    kept = search(vehicle, found.runs, moving=False)
+    assert {name: float(kept.vehicle.values()[name]) for name in NAMES} == pytest.approx(
+        TRUTH | {"K_x": 4.4}, rel=1e-12
+    )
+    assert np.abs(kept.start - initial_guess(vehicle, found.runs)[0]).max() > 1e-4
 
 
 def test_bound_is_kept_and_reached_where_the_data_ask_for_more():
@@ -160,7 +162,7 @@ def test_rate_that_nothing_measures_begins_as_fast_as_its_coordinate_moves():
     runs = stacked(vehicle, [driven(vehicle, 0.001 * np.arange(200), seed=1)])
     start = jnp.array([[60.0, 0.0]])
     runs = dataclasses.replace(runs, outputs=simulate(vehicle, runs, start), mask=jnp.ones_like(runs.mask))
-    _, found, *_ = search(vehicle, runs, moving=False)
+    found = search(vehicle, runs, moving=False).start
     np.testing.assert_allclose(found, start, rtol=0.02, atol=0.002)
 
 

@@ -13,7 +13,7 @@ import pytest
 import scipy.optimize
 from rigs import driven, oscillator, stacked
 
-from jaxsub.estimate import estimate_disturbance, evaluate
+from jaxsub.estimate import Ended, estimate_disturbance, evaluate
 from jaxsub.identifiability import coloured_covariance
 from jaxsub.likelihood import Columns, Disturbance, System, carried, covariance_derivatives, force_columns, restricted
 from jaxsub.results import RESULTS
@@ -32,8 +32,8 @@ def exact():
     runs = stacked(vehicle, synthetic(vehicle, inputs, seed=0, noise=False))
     mask = np.random.default_rng(5).random(runs.mask.shape) > 0.1
     runs = dataclasses.replace(runs, mask=runs.mask & mask, outputs=jnp.where(mask, runs.outputs, 0.0))
-    nothing = {"cost": jnp.asarray(0.0), "steps": jnp.asarray(0), "result": RESULTS.successful}
-    return evaluate(vehicle, runs, jnp.zeros((RUNS, 2)), jnp.asarray(SIGMA), **nothing)
+    nothing = jnp.asarray(0.0), jnp.asarray(0), RESULTS.successful
+    return evaluate(Ended(vehicle, runs, jnp.zeros((RUNS, 2)), jnp.asarray(SIGMA), *nothing))
 
 
 def gauss_markov(rng, count, size, time):
@@ -202,8 +202,8 @@ def test_restricted_likelihood_is_that_of_the_dense_covariance(dense):
 def test_coefficient_that_nothing_tells_keeps_an_error_without_bound_and_spoils_no_other(exact):
     rows = exact.runs.signals * 0.0
     runs = dataclasses.replace(exact.runs, signals=rows)
-    nothing = {"cost": exact.cost, "steps": exact.steps, "result": exact.result}
-    still = evaluate(exact.vehicle, runs, jnp.full((RUNS, 2), 0.3), exact.sigma, **nothing)
+    told = exact.cost, exact.steps, exact.result
+    still = evaluate(Ended(exact.vehicle, runs, jnp.full((RUNS, 2), 0.3), exact.sigma, *told))
     found = coloured_covariance(still).standard_errors
     assert found["B_x_drive"] > 1e3
     assert 0.0 < found["K_x"] < 4.0

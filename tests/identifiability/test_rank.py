@@ -8,7 +8,7 @@ import pytest
 from lateral import lateral
 from rigs import driven, oscillator, stacked
 
-from jaxsub.estimate import evaluate
+from jaxsub.estimate import Ended, evaluate
 from jaxsub.identifiability import identifiability, identifiable_subset
 from jaxsub.results import RESULTS
 from jaxsub.simulate import synthetic
@@ -25,8 +25,7 @@ def at_truth(vehicle, noisier=1.0, still=()):
     layout = vehicle.layout
     start = jnp.zeros((2, len(layout.equations) + len(layout.positions)))
     sigma = noisier * jnp.array([output.sigma for output in layout.outputs])
-    nothing = {"cost": jnp.asarray(0.0), "steps": jnp.asarray(0), "result": RESULTS.successful}
-    return evaluate(vehicle, runs, start, sigma, **nothing)
+    return evaluate(Ended(vehicle, runs, start, sigma, jnp.asarray(0.0), jnp.asarray(0), RESULTS.successful))
 
 
 @pytest.fixture(scope="module")
