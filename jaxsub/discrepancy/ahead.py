@@ -28,7 +28,7 @@ from .view import View, led_from, look
 
 # the most pieces into which a run is cut, the fewest samples of one, and of what was measured, the share of variance
 # that a free run may leave
-_PIECES, _FEWEST, _LEFT = 64, 8, 0.5
+_PIECES, _FEWEST, _LEFT = 64, 8, 0.1
 # of a number without which an effect would be none
 _AS_NOTHING = 1e-3
 

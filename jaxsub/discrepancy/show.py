@@ -153,9 +153,12 @@ class Luck(NamedTuple):
 
 
 def luck(before: HeldOut, after: HeldOut, sound: bool, *, freely: bool) -> Luck:
-    """The gain of held-out runs by a fit that is `sound` or not, of what a free run asked for or not."""
+    """The gain of held-out runs by a fit that is `sound` or not, of what a free run asked for or not.
+
+    What a free run errs goes together for long, but for no longer than until it is begun anew.
+    """
     likelihood, probability = _gained(after.expected, before.expected, _BLOCKS)
-    _, free_probability = _gained(before.squares, after.squares, LONG_BLOCKS)
+    _, free_probability = _gained(before.squares, after.squares, max(LONG_BLOCKS, after.pieces))
     total = lambda held: float(sum(squares.sum() for squares in held.squares))
     free = total(after) / max(total(before), 1e-300)
     return Luck(likelihood, probability, free, free_probability, sound, freely)
