@@ -21,6 +21,7 @@ from ..vehicle import AbstractVehicle
 from .evidence import evidence_of
 from .model import freed, joined, places
 from .programs import make_room
+from .selector import Selector
 from .show import HeldOut, Luck, begun_anew, expects, luck, starts
 from .stiffness import substeps_for
 from .trial import Model, Trial
@@ -106,11 +107,12 @@ def less(view: View, effect: AbstractEffect) -> AbstractVehicle:
     return view.vehicle.with_values({row.name: jnp.asarray(value) for row, value in zip(rows, moved, strict=True)})
 
 
-def lacking(view: View, effect: AbstractEffect) -> View:
-    """A view as it would be without one effect of its vehicle, by a linear picture from where it stands.
+def lacking(selector: Selector, effect: AbstractEffect) -> Selector:
+    """What would be asked for in the place of one effect of a view's vehicle, by a linear picture from where it stands.
 
-    Once all others are there, it says what would be asked for in its place.
+    Once all others are there. Of a selector that lists what is present too.
     """
+    view = selector.evidence.view
     rows, values = view.vehicle.layout.free, view.vehicle.values()
     own = [i for i, row in enumerate(rows) if row.name.startswith(f"{effect.label}.")]
     others = [i for i in range(len(rows)) if i not in own]
@@ -120,7 +122,7 @@ def lacking(view: View, effect: AbstractEffect) -> View:
         keep[1 + i, 0] = float(values[rows[i].name]) * view.length[i]
     across = view.covariance[np.ix_(others, own)]
     taken = across @ np.linalg.solve(view.covariance[np.ix_(own, own)], across.T)
-    return dataclasses.replace(
+    fewer = dataclasses.replace(
         view,
         vehicle=view.vehicle.without_effect(effect.label),
         covariance=view.covariance[np.ix_(others, others)] - taken,
@@ -128,6 +130,7 @@ def lacking(view: View, effect: AbstractEffect) -> View:
         prior=keep.T @ view.prior @ keep,
         length=view.length[others],
     )
+    return selector.seen_from(fewer, keep)
 
 
 def proved(trial: Trial, base: Model, best: Model) -> Model | None:

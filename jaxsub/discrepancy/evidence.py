@@ -21,6 +21,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.linalg import block_diag
 
 from ..estimate import estimate_disturbance
 from ..likelihood import Columns, Disturbance, System, part_products
@@ -106,8 +107,16 @@ class Products:
         whole = np.zeros((len(self.gram), len(kept) + weights.shape[1]))
         whole[kept, range(len(kept))] = 1.0
         whole[[self.known + c for c in more], len(kept) :] = weights
-        gram, parts = whole.T @ self.gram @ whole, whole.T @ self.parts @ whole
-        return dataclasses.replace(self, gram=gram, parts=parts)
+        return self._of(whole, self.known)
+
+    def seen_from(self, keep: np.ndarray) -> "Products":
+        """With sums `keep` (1 + p, 1 + m) of the residual and the free parameters in the place of these."""
+        candidates = len(self.gram) - self.known
+        return self._of(np.asarray(block_diag(keep, np.eye(candidates))), keep.shape[1])
+
+    def _of(self, sums: np.ndarray, known: int) -> "Products":
+        gram, parts = sums.T @ self.gram @ sums, sums.T @ self.parts @ sums
+        return dataclasses.replace(self, gram=gram, parts=parts, known=known)
 
     def weights(self, chosen: Sequence[int]) -> np.ndarray:
         """(1 + p + q,) of the columns whose sum is the residual less what parameters and `chosen` take up of it."""
@@ -187,6 +196,12 @@ class Evidence:
         samples = int(np.sum(np.asarray(system.measured)))
         return Products(disturbance, gram, np.asarray(spreads), samples, known, parts)
 
+    def seen_from(self, view: View, keep: np.ndarray) -> "Evidence":
+        """Of a view along the same path whose residual and free parameters are sums `keep` (1 + p, 1 + m) of these."""
+        candidates = jax.tree.map(lambda column: column[..., len(keep) :], self.whole)
+        products = [one.seen_from(keep) for one in self.products]
+        return Evidence(view, view.base + candidates, self.length, products)
+
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
         picked = self.picked([*chosen, *[0] * (SLOTS - len(chosen))])
@@ -226,14 +241,5 @@ def _parts(
 
 def evidence_of(view: View) -> float:
     """Log evidence of a view's own model, each free number's prior worth one sample."""
-    products = _own(view)
+    products = Evidence.of(view, force_columns(view, []), [view.disturbance]).products[0]
     return products.log_evidence([]) - 0.5 * (products.known - 1) * float(np.log(products.samples))
-
-
-def whole_evidence(view: View) -> float:
-    """Log evidence of a view's own model beside its candidates, as `Evidence.best` has it with none of them."""
-    return _own(view).log_evidence([])
-
-
-def _own(view: View) -> Products:
-    return Evidence.of(view, force_columns(view, []), [view.disturbance]).products[0]

@@ -21,14 +21,14 @@ def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, pro
     return weighed(view, listed(view, vocabulary), progress)
 
 
-def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None) -> Selector:
-    """All that the recordings of a view may ask for and that its vehicle does not have."""
+def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, *, present: bool = False) -> Selector:
+    """All that the recordings of a view may ask for and that its vehicle does not have; or also what is `present`."""
     make_room()
-    present = {effect.label for effect in view.vehicle.effects}
+    there = set() if present else {effect.label for effect in view.vehicle.effects}
     known = facts(view)
-    absent = [effect for effect in candidates(known, vocabulary) if effect.label not in present]
-    columns, owners = candidate_columns(view, absent)
-    return Selector(Evidence.of(view, columns), absent, owners, looked_at(known, vocabulary))
+    effects = [effect for effect in candidates(known, vocabulary) if effect.label not in there]
+    columns, owners = candidate_columns(view, effects)
+    return Selector(Evidence.of(view, columns), effects, owners, looked_at(known, vocabulary))
 
 
 def weighed(view: View, selector: Selector, progress: Progress) -> Found:

@@ -11,11 +11,10 @@ import numpy as np
 
 from ..effects import AbstractEffect
 from .ahead import Ahead, lacking, proved
-from .evidence import whole_evidence
 from .examine import listed, weighed
 from .model import p_value
 from .name import Named, asked_still, named_on, refitted, standing
-from .selector import SIGNIFICANCE
+from .selector import SIGNIFICANCE, Selector
 from .show import Luck, luck
 from .trial import Model, Trial, Tries, upright, worth_trying
 from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
@@ -96,9 +95,9 @@ def _asked_again(
 
     What was taken first may have stood in for what came after it, and others may do better beside that.
     """
-    said = []
+    said, every = [], _all_of(best, vocabulary)
     for one in named:
-        one, others = _beside(ahead, start, best, one, vocabulary)
+        one, others = _beside(ahead, start, best, every, one, vocabulary)
         models = [(one.effect, best)]
         models += [(rival, ahead.instead(start, best, one.effect.label, rival)) for rival in others]
         models = [(effect, model) for effect, model in models if model.stands] or models[:1]
@@ -107,22 +106,35 @@ def _asked_again(
         if model is best:
             said.append(refitted(one, values))
         else:
-            best = model
-            said.append(_beside(ahead, start, best, dataclasses.replace(one, effect=effect), vocabulary)[0])
+            best, every = model, _all_of(model, vocabulary)
+            said.append(_beside(ahead, start, best, every, dataclasses.replace(one, effect=effect), vocabulary)[0])
     return best, said
 
 
+def _all_of(model: Model, vocabulary: tuple[type[AbstractEffect], ...] | None) -> Selector:
+    """All that may be asked for, and what the model has."""
+    selector = listed(model.view, vocabulary, present=True)
+    selector.lose_free_run()
+    return selector
+
+
 def _beside(
-    ahead: Ahead, start: Model, best: Model, one: Named, vocabulary: tuple[type[AbstractEffect], ...] | None
+    ahead: Ahead,
+    start: Model,
+    best: Model,
+    every: Selector,
+    one: Named,
+    vocabulary: tuple[type[AbstractEffect], ...] | None,
 ) -> tuple[Named, list[AbstractEffect]]:
     """How probable a named effect is beside all others of a model, and what may stand in its place, the best first.
 
-    Asked of a linear picture without it, or, where that does not even give back what was taken from it, of a model.
+    Asked of a linear picture without it, of which `every` lists all, or, where that does not even give back what was
+    taken from it, of a model.
     """
-    whole = whole_evidence(best.view)
-    for view in (lambda: lacking(best.view, one.effect), lambda: ahead.instead(start, best, one.effect.label).view):
-        selector = listed(view(), vocabulary)
-        selector.lose_free_run()
+    whole = every.evidence.best([])[0]
+    without_it = lambda: _all_of(ahead.instead(start, best, one.effect.label), vocabulary)
+    for asked in (lambda: lacking(every, one.effect), without_it):
+        selector = asked()
         scan = selector.scan([])
         own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
         number = max(own, key=lambda i, value=scan.value: value[i])

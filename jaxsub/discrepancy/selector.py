@@ -1,6 +1,7 @@
 """What every candidate effect would add to those already chosen, and which of them to take next."""
 
 import collections
+import copy
 import dataclasses
 from collections.abc import Mapping, Sequence
 
@@ -12,6 +13,7 @@ from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numb
 from ..likelihood import Disturbance
 from .columns import plausible
 from .evidence import SLOTS, Evidence
+from .view import View
 
 SIGNIFICANCE = 0.01
 _ABSORBED = 1e-4
@@ -59,14 +61,10 @@ class Selector:
         looked_at: Mapping[str, int],
     ):
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
-        self.kept = evidence.products[0].kept(self.owners)
-        self.usable = np.isfinite(self.kept) & (self.kept > _ABSORBED)
-        self.estimated: set[tuple[int, ...]] = set()
         own = evidence.view.disturbance
         # a free run has no disturbance to put errors down to
         still = Disturbance(_STILL * own.force, own.time, jnp.ones_like(own.noise))
         self.free = evidence.under(still)
-        self.freely: set[int] = set()
         self.lost = False
         forms = collections.Counter(effect.name for effect in self.candidates)
         # every name is as probable as any other before the data, and within a name every form
@@ -76,6 +74,23 @@ class Selector:
         labels = collections.Counter(effect.name for effect in {e.label: e for e in self.candidates}.values())
         among = [looked_at.get(effect.name, 0) / labels[effect.name] for effect in self.candidates]
         self.tried = len(listed) * np.maximum(among, 1.0)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Nothing is estimated, and what the coefficients absorb or the vehicle has is not to be asked for."""
+        self.estimated: set[tuple[int, ...]] = set()
+        self.freely: set[int] = set()
+        self.kept = self.evidence.products[0].kept(self.owners)
+        present = {effect.label for effect in self.evidence.view.vehicle.effects}
+        absent = np.array([effect.label not in present for effect in self.candidates], bool)
+        self.usable = np.isfinite(self.kept) & (self.kept > _ABSORBED) & absent
+
+    def seen_from(self, view: View, keep: np.ndarray) -> "Selector":
+        """The same candidates asked of a view that `Evidence.seen_from` takes."""
+        other = copy.copy(self)
+        other.evidence, other.free = self.evidence.seen_from(view, keep), self.free.seen_from(keep)
+        other._begin()
+        return other
 
     def columns(self, chosen: Sequence[int]) -> list[int]:
         """The columns of candidates."""

@@ -10,6 +10,7 @@ from rigs import oscillator
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.ahead import Ahead, lacking, less, pieces_of
 from jaxsub.discrepancy.evidence import evidence_of
+from jaxsub.discrepancy.examine import listed
 from jaxsub.discrepancy.leading import Led, of_order
 from jaxsub.discrepancy.many import asked_for, by_what_comes_next
 from jaxsub.discrepancy.name import Named
@@ -122,12 +123,27 @@ def test_a_view_that_lacks_an_effect_is_that_of_the_vehicle_without_it():
     vehicle, runs = true_pendulum().with_effect(CubicDamping("x", jnp.asarray(0.0))), batch(pendulum(), steered()[:2])
     view = led_from(vehicle, runs, SIGMA, [dataclasses.replace(STILL, force=jnp.array([1.0]))])
     effect = view.vehicle.effects[-1]
-    fewer = lacking(view, effect)
+    fewer = lacking(listed(view, None, present=True), effect).evidence.view
     problem = of_order(Problem.of(fewer.vehicle, runs, SIGMA))
     anew = Led(problem, problem.guess).at(fewer.vehicle, view.disturbance)
     before, there, expected = (squares(one) for one in (view, fewer, anew))
     assert abs(numbers(effect)["coefficient"]) > 1e-4
     assert abs(there - expected) < 0.05 * abs(expected - before)
+
+
+def test_what_is_asked_for_in_the_place_of_an_effect_takes_no_other_pass_through_the_recordings():
+    """Claim: candidates mapped from those of the whole model have the evidence that they have from the view without."""
+    view = view_of_truth()
+    effect = view.vehicle.effects[0]
+    mapped = lacking(listed(view, None, present=True), effect)
+    direct = listed(mapped.evidence.view, None)
+    effects = [{(e.label, *numbers(e).values()): i for i, e in enumerate(s.candidates)} for s in (mapped, direct)]
+    assert set(effects[1]) <= set(effects[0])
+    assert {key[0] for key in set(effects[0]) - set(effects[1])} <= {e.label for e in view.vehicle.effects[1:]}
+    scans = mapped.scan([]), direct.scan([])
+    both = [scan.statistic[[which[key] for key in effects[1]]] for scan, which in zip(scans, effects, strict=True)]
+    assert np.max(both[0]) > 10.0
+    np.testing.assert_allclose(*both, rtol=1e-6, atol=1e-6)
 
 
 def squares(at) -> float:
