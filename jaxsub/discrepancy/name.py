@@ -102,7 +102,19 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
 
 
 def _settled(selector: Selector, chosen: list[int]) -> Scan:
-    """The scan once the leaders' own disturbances are known: what a rival leaves to a disturbance must not count."""
+    """The scan once the leaders' own disturbances are known: what a rival leaves to a disturbance must not count.
+
+    Where none gains, also those of what may be hidden in the disturbance.
+    """
+    scan = _led(selector, chosen)
+    if np.max(scan.value) > selector.value(chosen):
+        return scan
+    for index in selector.hidden(chosen):
+        selector.estimate([*chosen, index])
+    return selector.scan(chosen)
+
+
+def _led(selector: Selector, chosen: list[int]) -> Scan:
     for _ in range(_TRIES):
         scan = selector.scan(chosen)
         best = int(np.argmax(scan.value))

@@ -12,7 +12,7 @@ from scipy import special
 from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
 from ..likelihood import Disturbance
 from .columns import plausible
-from .evidence import SLOTS, Evidence
+from .evidence import FIRST, SLOTS, Evidence, Products
 from .view import View
 
 SIGNIFICANCE = 0.01
@@ -108,13 +108,14 @@ class Selector:
             own = self.columns(chosen)
             self.evidence.products.append(self.evidence.estimate(own, self.evidence.best(own)[1].disturbance))
 
-    def scan(self, chosen: Sequence[int]) -> Scan:
-        """Every candidate on top of `chosen`."""
+    def scan(self, chosen: Sequence[int], under: Products | None = None) -> Scan:
+        """Every candidate on top of `chosen`, at the disturbance of some products or at the best."""
         own = self.columns(chosen)
-        base = self.evidence.best(own)[0]
+        among = self.evidence.products if under is None else [under]
+        base = max(products.log_evidence(own) for products in among)
         best, statistic = np.full(len(self.candidates), -np.inf), np.zeros(len(self.candidates))
         sizes: list[np.ndarray] = [np.zeros(len(columns)) for columns in self.owners]
-        for products in self.evidence.products:
+        for products in among:
             gains, at = products.gains(own, self.owners), products.log_evidence(own)
             values = at + gains.evidence
             for i in np.flatnonzero(values > best):
@@ -132,6 +133,12 @@ class Selector:
         fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
+
+    def hidden(self, chosen: Sequence[int]) -> list[int]:
+        """What leads on top of `chosen` where less is put down to the disturbance, and may have been put down to it."""
+        scans = [self.scan(chosen, under) for under in self.evidence.products[1:FIRST]]
+        leaders = {int(np.argmax(scan.value)): float(np.max(scan.value)) for scan in scans}
+        return [index for index, value in leaders.items() if np.isfinite(value)]
 
     def of_free_run(self, chosen: Sequence[int]) -> np.ndarray:
         """(m,) the share of what `chosen` leave of a free run's errors that each candidate explains."""
