@@ -1,6 +1,7 @@
 """What the evidence amounts to: none, named, ambiguous or unknown."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 from ..effects import AbstractEffect, SmoothForce
@@ -79,6 +80,8 @@ def _gain_said(label: str, gain: Luck) -> str:
     if gain.helps and gain.freely:
         said = f"With {label} free runs through the held-out runs leave {gain.free:.0%} of their squared errors; "
         return said + f"that this is luck has probability {gain.free_probability:.2g}."
+    if gain.helps and not math.isfinite(gain.likelihood):
+        return f"Without {label} the model diverges along the held-out runs."
     if gain.helps:
         said = f"With {label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
         return said + f"that this is luck has probability {gain.probability:.2g}."

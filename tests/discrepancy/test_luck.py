@@ -9,6 +9,9 @@ from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.show import HeldOut, hold, luck
+from jaxsub.discrepancy.verdict import NOTHING as NOTHING_SAID
+from jaxsub.discrepancy.verdict import helped
+from jaxsub.effects.hull_damping import CubicDamping
 from jaxsub.likelihood import Disturbance
 
 
@@ -65,6 +68,8 @@ def test_a_model_that_diverges_gains_nothing_and_one_that_does_no_more_gains():
         assert not luck(NOTHING, lost, True, freely=freely).helps
         assert not luck(lost, lost, True, freely=freely).helps
         assert luck(lost, better, True, freely=freely).helps
+    said = helped(NOTHING_SAID, CubicDamping("x", -1.0), luck(lost, better, True, freely=False)).notes
+    assert said == ["Without cubic-damping[x] the model diverges along the held-out runs."]
 
 
 def test_a_held_out_run_that_diverges_is_no_number_nowhere():
