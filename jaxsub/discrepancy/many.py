@@ -34,19 +34,18 @@ def by_what_comes_next(
     it out.
     """
     ahead = Ahead(trial)
-    start = best = ahead.begin(base)
-    named: list[Named] = []
+    search = _Search(ahead, ahead.begin(base), vocabulary)
+    best, named = search.start, list[Named]()
     judged, fallen, refusals = NOTHING, set[str](), 0
     while len(best.added) < _MANY and refusals <= _REFUSALS:
-        selector = listed(best.view, vocabulary)
-        selector.lose_free_run()
+        selector = search.listed(best)
         selector.usable[[effect.label in fallen for effect in selector.candidates]] = False
         found = weighed(best.view, selector, trial.progress)
         said = judge(found.naming, found.pattern, found.memory)
         chosen = worth_trying(found, said)
         if not chosen:
             break
-        grown = _grown(ahead, start, Tries(ahead.with_effects, best, found, False), chosen, named)
+        grown = search.grown(Tries(ahead.with_effects, best, found, False), chosen, named)
         if grown is None:
             fallen.add(selector.candidates[chosen[0]].label)
             refusals += 1
@@ -54,8 +53,8 @@ def by_what_comes_next(
         judged = both(judged, dataclasses.replace(said, named=[], notes=[]))
         best, named, refused = grown
         fallen |= refused
-        best, named = _asked_again(ahead, start, best, named, vocabulary)
-    best, named, gains = asked_for(ahead, start, best, named)
+        best, named = search.asked_again(best, named)
+    best, named, gains = asked_for(ahead, search.start, best, named)
     whole = proved(trial, base, best) if named else None
     if whole is None:
         return None
@@ -65,90 +64,84 @@ def by_what_comes_next(
     return whole, by_all(judged, whole.shown.pieces)
 
 
-def _grown(
-    ahead: Ahead, start: Model, tries: Tries, chosen: Sequence[int], named: Sequence[Named]
-) -> tuple[Model, list[Named], set[str]] | None:
-    """The model with those of `chosen` and of what was `named` before that the held-out runs ask for beside each other,
-    if they gain, and what they refuse; or with the first of them alone where the others lead astray.
+@dataclasses.dataclass(frozen=True)
+class _Search:
+    """What every step of one search has: how models are made, where it starts from, and what may be asked for."""
 
-    One that they refuse takes none of the others along. What is chosen first does most, and of what is so large a
-    linear picture sees other things in its place.
-    """
-    before = tries.model([])
-    for some in [chosen, chosen[:1]][: len(chosen)]:
-        kept = upright(tries, some)
-        more = [*named, *standing(tries.found.selector, kept)]
-        model, stand, _ = asked_for(ahead, start, tries.model(kept), more)
-        if luck(before.shown, model.shown, model.stands, freely=False).helps:
-            return model, stand, {one.effect.label for one in more} - {one.effect.label for one in stand}
-    return None
+    ahead: Ahead
+    start: Model
+    vocabulary: tuple[type[AbstractEffect], ...] | None
 
+    def listed(self, model: Model, *, present: bool = False) -> Selector:
+        """What may be asked for on top of a model; or also what it has, if `present`."""
+        selector = listed(model.view, self.vocabulary, present=present)
+        selector.lose_free_run()
+        return selector
 
-def _asked_again(
-    ahead: Ahead,
-    start: Model,
-    best: Model,
-    named: Sequence[Named],
-    vocabulary: tuple[type[AbstractEffect], ...] | None,
-) -> tuple[Model, list[Named]]:
-    """The model with another in the place of a name, where that is more probable beside all others.
+    def grown(
+        self, tries: Tries, chosen: Sequence[int], named: Sequence[Named]
+    ) -> tuple[Model, list[Named], set[str]] | None:
+        """The model with those of `chosen` and of what was `named` before that the held-out runs ask for beside each
+        other, if they gain, and what they refuse; or with the first of them alone where the others lead astray.
 
-    What was taken first may have stood in for what came after it, and others may do better beside that.
-    """
-    said, every = [], _all_of(best, vocabulary)
-    for one in named:
-        one, others = _beside(ahead, start, best, every, one, vocabulary)
-        models = [(one.effect, best)]
-        models += [(rival, ahead.instead(start, best, one.effect.label, rival)) for rival in others]
-        models = [(effect, model) for effect, model in models if model.stands] or models[:1]
-        values = [(effect, -float(model.fit.cost)) for effect, model in models]
-        effect, model = models[int(np.argmax([value for _, value in values]))]
-        if model is best:
-            said.append(refitted(one, values))
-        else:
-            best, every = model, _all_of(model, vocabulary)
-            said.append(_beside(ahead, start, best, every, dataclasses.replace(one, effect=effect), vocabulary)[0])
-    return best, said
+        One that they refuse takes none of the others along. What is chosen first does most, and of what is so large a
+        linear picture sees other things in its place.
+        """
+        before = tries.model([])
+        for some in [chosen, chosen[:1]][: len(chosen)]:
+            kept = upright(tries, some)
+            more = [*named, *standing(tries.found.selector, kept)]
+            model, stand, _ = asked_for(self.ahead, self.start, tries.model(kept), more)
+            if luck(before.shown, model.shown, model.stands, freely=False).helps:
+                return model, stand, {one.effect.label for one in more} - {one.effect.label for one in stand}
+        return None
 
+    def asked_again(self, best: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
+        """The model with another in the place of a name, where that is more probable beside all others.
 
-def _all_of(model: Model, vocabulary: tuple[type[AbstractEffect], ...] | None) -> Selector:
-    """All that may be asked for, and what the model has."""
-    selector = listed(model.view, vocabulary, present=True)
-    selector.lose_free_run()
-    return selector
+        What was taken first may have stood in for what came after it, and others may do better beside that.
+        """
+        said, every = [], self.listed(best, present=True)
+        for one in named:
+            one, others = self._beside(best, every, one)
+            models = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
+            models = [(effect, model) for effect, model in models if model.stands] or models[:1]
+            values = [(effect, -float(model.fit.cost)) for effect, model in models]
+            effect, model = models[int(np.argmax([value for _, value in values]))]
+            if model is best:
+                said.append(refitted(one, values))
+            else:
+                best, every = model, self.listed(model, present=True)
+                said.append(self._beside(best, every, dataclasses.replace(one, effect=effect))[0])
+        return best, said
 
+    def _without(self, best: Model, one: Named, *rival: AbstractEffect) -> Model:
+        """The model without a name, or with a rival in its place."""
+        return self.ahead.instead(self.start, best, one.effect.label, *rival)
 
-def _beside(
-    ahead: Ahead,
-    start: Model,
-    best: Model,
-    every: Selector,
-    one: Named,
-    vocabulary: tuple[type[AbstractEffect], ...] | None,
-) -> tuple[Named, list[AbstractEffect]]:
-    """How probable a named effect is beside all others of a model, and what may stand in its place, the best first.
+    def _beside(self, best: Model, every: Selector, one: Named) -> tuple[Named, list[AbstractEffect]]:
+        """How probable a named effect is beside all others of a model, and what may stand in its place, the best first.
 
-    Asked of a linear picture without it, of which `every` lists all, or, where that does not even give back what was
-    taken from it, of a model.
-    """
-    whole = every.evidence.best([])[0]
-    without_it = lambda: _all_of(ahead.instead(start, best, one.effect.label), vocabulary)
-    for asked in (lambda: lacking(every, one.effect), without_it):
-        selector = asked()
-        scan = selector.scan([])
-        own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
-        number = max(own, key=lambda i, value=scan.value: value[i])
-        without, again = (selector.evidence.best(selector.columns(some))[0] for some in ([], [number]))
-        if np.isfinite(scan.value[number]) and whole - again < _LOST * (whole - without):
-            break
-    if not np.isfinite(scan.value[number]):
-        return one, []
-    close = (scan.value > scan.value[number] - _CLOSE) & ~asked_still(selector, [], number, scan)
-    close[own] = False
-    others: dict[str, AbstractEffect] = {}
-    for i in (i for i in np.argsort(-scan.value) if close[i]):
-        others.setdefault(scan.effects[i].label, scan.effects[i])
-    return named_on(selector, [], number), [*others.values()][:_ANEW]
+        Asked of a linear picture without it, of which `every` lists all, or, where that does not even give back what
+        was taken from it, of a model.
+        """
+        whole = every.evidence.best([])[0]
+        for asked in (lambda: lacking(every, one.effect), lambda: self.listed(self._without(best, one))):
+            selector = asked()
+            scan = selector.scan([])
+            own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
+            number = max(own, key=lambda i, value=scan.value: value[i])
+            without, again = (selector.evidence.best(selector.columns(some))[0] for some in ([], [number]))
+            if np.isfinite(scan.value[number]) and whole - again < _LOST * (whole - without):
+                break
+        if not np.isfinite(scan.value[number]):
+            return one, []
+        close = (scan.value > scan.value[number] - _CLOSE) & ~asked_still(selector, [], number, scan)
+        close[own] = False
+        others: dict[str, AbstractEffect] = {}
+        for i in (i for i in np.argsort(-scan.value) if close[i]):
+            others.setdefault(scan.effects[i].label, scan.effects[i])
+        return named_on(selector, [], number), [*others.values()][:_ANEW]
 
 
 def asked_for(
