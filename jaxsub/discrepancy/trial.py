@@ -127,6 +127,7 @@ class Tries:
     def __init__(self, make: Callable[..., Model], base: Model, found: Found, freely: bool):
         self.make, self.found, self.freely = make, found, freely
         self.models: dict[tuple[int, ...], Model] = {(): base}
+        self.values: dict[tuple[int, ...], float] = {}
         self.said: dict[int, Luck] = {}
 
     def effects(self, numbers: Sequence[int]) -> list[AbstractEffect]:
@@ -173,13 +174,21 @@ class Tries:
         return self.said[more].helps
 
     def gain(self, fewer: Sequence[int], more: Sequence[int]) -> Luck:
-        """What the held-out runs gain from the one set to the other."""
+        """What the held-out runs gain from the one set to the other.
+
+        Sound if the training runs tell more than before once it is fitted: a linear picture may promise too much, and a
+        little is gained by whatever bends.
+        """
         before, after = self.model(fewer).shown, self.model(more).shown
-        return luck(before, after, self.sound(more), freely=self.freely)
+        kept = self.freely or self.value(more) > self.value(fewer)
+        return luck(before, after, self.sound(more) and kept, freely=self.freely)
 
     def value(self, numbers: Sequence[int]) -> float:
         """Log evidence of the fit with these; minus infinity where they are not sound."""
-        return evidence_of(self.model(numbers).view) if self.sound(numbers) else -np.inf
+        key = tuple(sorted(numbers))
+        if key not in self.values:
+            self.values[key] = evidence_of(self.model(key).view) if self.sound(key) else -np.inf
+        return self.values[key]
 
     def closest(self, others: Sequence[int], index: int) -> Fits:
         """A candidate and its twins with the log evidence of their fits, the `others` beside them; the best first."""

@@ -9,6 +9,7 @@ from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.show import HeldOut, hold, luck
+from jaxsub.discrepancy.trial import Model, Tries
 from jaxsub.discrepancy.verdict import NOTHING as NOTHING_SAID
 from jaxsub.discrepancy.verdict import helped
 from jaxsub.effects.hull_damping import CubicDamping
@@ -58,6 +59,27 @@ def test_what_is_begun_anew_more_often_tells_more():
     assert whole.free == anew.free < 1.0
     assert anew.helps
     assert not whole.helps
+
+
+class OneTry(Tries):
+    """A candidate whose fit halves the errors of held-out runs, with the log evidence of its fit."""
+
+    def __init__(self, evidence, freely):
+        self.freely, self.values = freely, {(): 0.0, (3,): evidence}
+
+    def model(self, numbers):
+        return Model(None, None, shown(np.full(480, 0.1), np.full(480, 0.5)) if numbers else NOTHING, ())
+
+    def sound(self, numbers):
+        return True
+
+
+@pytest.mark.parametrize(
+    ("evidence", "freely", "stands"), [(1.0, False, True), (-1.0, False, False), (-1.0, True, True)]
+)
+def test_a_fit_that_training_runs_do_not_ask_for_does_not_stand(evidence, freely, stands):
+    """Claim: what held-out runs gain by a fit with less log evidence than before is none, unless a free run asked."""
+    assert OneTry(evidence, freely).gain([], [3]).helps is stands
 
 
 def test_a_model_that_diverges_gains_nothing_and_one_that_does_no_more_gains():
