@@ -3,15 +3,21 @@ r"""Integration steps short enough for the forces of effects: what decays within
 Linear damping is exact at any step. What effects add is stepped explicitly, and from $|\lambda|h \approx 2.8$ on a
 fourth-order Runge–Kutta step grows where the motion decays. Source: Hairer and Wanner (1996), Solving Ordinary
 Differential Equations II, ch. IV.2.
+
+States of effects may turn so sharply that a step which does not grow is still too long: half as long ones then show by
+how much.
 """
 
 import dataclasses
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 from ..effects import AbstractForce, AbstractMemory, Motion
-from ..estimate import initial_guess
+from ..estimate import initial_guess, predict
+from ..likelihood import concentrated_sigma
 from ..recording.runs import Runs
 from ..simulate import sampled_states
 from ..vehicle import AbstractVehicle
@@ -20,6 +26,8 @@ from .view import Trajectory
 FINEST = 16  # steps in a sample interval
 # of a step times the fastest rate: beyond the one it is not followed, and with the other it is
 _TOO_MUCH, _FOLLOWED = 2.5, 1.5
+# of a channel's noise, what steps half as long may change
+_UNSEEN = 0.05
 # of a velocity's rms, for differences
 _SMALL = 1e-4
 
@@ -71,6 +79,25 @@ def substeps_free(vehicle: AbstractVehicle, runs: Runs) -> int:
             return asked
         tried, most = dataclasses.replace(tried, substeps=asked), _FOLLOWED
     return runs.substeps
+
+
+def substeps_unseen(vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Array) -> int:
+    """Steps in a sample interval of which half as long ones change no channel by much of its noise `sigma` (c,), rms.
+
+    As `runs` are where it has no effect with states, or diverges however fine its steps. Source: Hairer, Nørsett and
+    Wanner (1993), Solving Ordinary Differential Equations I, ch. II.4 (step doubling).
+    """
+    if not any(isinstance(effect, AbstractMemory) for effect in vehicle.effects):
+        return runs.substeps
+    shown = lambda steps: predict(vehicle, dataclasses.replace(runs, substeps=steps), start)
+    steps, before = runs.substeps, shown(runs.substeps)
+    while steps < FINEST:
+        after = shown(2 * steps)
+        changed = concentrated_sigma(jnp.where(runs.mask, after - before, 0.0), runs) / sigma
+        if bool(jnp.all(changed <= _UNSEEN)):
+            return steps
+        steps, before = 2 * steps, after
+    return steps if bool(jnp.all(jnp.isfinite(before))) else runs.substeps
 
 
 def substeps_of(turned: float, least: int = 1) -> int:

@@ -14,13 +14,13 @@ from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .evidence import evidence_of
 from .generic import Pattern, most_explained
-from .model import join, p_value, sound, told
+from .model import freed, join, p_value, sound, told
 from .name import Named, Naming, named_on, refitted, standing
 from .programs import make_room
 from .progress import Progress
 from .selector import SIGNIFICANCE, Selector
 from .show import HeldOut, Luck, hold, luck
-from .stiffness import substeps_for
+from .stiffness import substeps_for, substeps_unseen
 from .verdict import Judged, helped, settled
 from .view import View, look
 from .whiteness import Memory
@@ -103,6 +103,10 @@ class Trial:
         if substeps > joined.runs.substeps:
             finer = dataclasses.replace(model.fit, runs=dataclasses.replace(model.fit.runs, substeps=substeps))
             joined = join(model.view, finer, effects, self.file, near)
+        substeps = substeps_unseen(joined.vehicle, joined.runs, joined.start, joined.sigma)
+        if substeps > joined.runs.substeps:
+            runs = dataclasses.replace(joined.runs, substeps=substeps)
+            joined = freed(dataclasses.replace(joined, runs=runs), joined.vehicle)
         view = look(joined, disturbance)
         return Model(joined, view, self.held_out(joined, view.disturbance), (*model.added, *effects))
 
