@@ -243,4 +243,4 @@ def _parts(
 def evidence_of(view: View) -> float:
     """Log evidence of a view's own model, each free number's prior worth one sample."""
     products = Evidence.of(view, force_columns(view, []), [view.disturbance]).products[0]
-    return products.log_evidence([]) - 0.5 * (products.known - 1) * float(np.log(products.samples))
+    return float(products.log_evidence([]) - 0.5 * (products.known - 1) * np.log(products.samples))

@@ -1,5 +1,7 @@
 """A regime is found where a mismatch has one, at its threshold, and hardly ever where it has none."""
 
+from types import SimpleNamespace
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -87,7 +89,8 @@ def test_an_effect_trades_with_what_its_numbers_go_with():
     scale = np.array([1e3, 1e-2, 1.0, 5.0])
     covariance = (root @ root.T) * scale * scale[:, None]
     fit = object.__new__(Fit)
-    object.__setattr__(fit, "names", ("drag.C", "drag.D", "Y_r", "Y_v"))
+    rows = [SimpleNamespace(name=name) for name in ("drag.C", "drag.D", "Y_r", "Y_v")]
+    object.__setattr__(fit, "vehicle", SimpleNamespace(layout=SimpleNamespace(free=rows)))
     object.__setattr__(fit, "covariance", jnp.asarray(covariance))
     assert trades(fit, "drag") == pytest.approx({"Y_v": -0.93 / np.hypot(0.93, 0.37)}, rel=1e-9)
     assert trades(fit, "none") == {}
