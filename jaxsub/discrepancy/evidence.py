@@ -34,6 +34,7 @@ SLOTS = 8
 _PARTS = 4
 # shares of the disturbance that the model without candidates asks for: what was left out may be part or all of it
 _SHARES = (1.0, 0.1, 0.003)
+# products that evidence begins with
 FIRST = len(_SHARES)
 
 
