@@ -3,14 +3,12 @@
 import dataclasses
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 
-from ..estimate import initial_guess
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
 from ..vehicle import AbstractVehicle
-from .stiffness import substeps_free, substeps_of, substeps_unseen
+from .stiffness import substeps_free, substeps_of
 
 
 def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
@@ -24,8 +22,4 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     runs = stack_runs(
         recordings, held=layout.held, interpolated=layout.interpolated, channels=layout.channels, substeps=substeps
     )
-    runs = dataclasses.replace(runs, substeps=substeps_free(vehicle, runs))
-    # what noise hides is told where the file says how large that is
-    sigma = jnp.array([output.sigma or np.inf for output in layout.outputs])
-    unseen = substeps_unseen(vehicle, runs, initial_guess(vehicle, runs)[0], sigma)
-    return dataclasses.replace(runs, substeps=unseen)
+    return dataclasses.replace(runs, substeps=substeps_free(vehicle, runs))

@@ -115,6 +115,7 @@ def _settled(selector: Selector, chosen: list[int]) -> Scan:
 
 
 def _led(selector: Selector, chosen: list[int]) -> Scan:
+    """The scan once the best, or the first few that were, have their own disturbances estimated."""
     for _ in range(_TRIES):
         scan = selector.scan(chosen)
         best = int(np.argmax(scan.value))

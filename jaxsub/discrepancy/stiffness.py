@@ -63,7 +63,19 @@ def substeps_for(vehicle: AbstractVehicle, runs: Runs, motion: Motion, most: flo
 
 
 def substeps_free(vehicle: AbstractVehicle, runs: Runs) -> int:
-    """The same as the vehicle runs free; as `runs` are, where it diverges however fine its steps.
+    """The same as the vehicle runs free, and as many as its file's noise asks of effects with states.
+
+    What the file does not say the noise of asks for none.
+    """
+    runs = dataclasses.replace(runs, substeps=_followed_free(vehicle, runs))
+    if not _with_states(vehicle):
+        return runs.substeps
+    sigma = jnp.array([output.sigma or np.inf for output in vehicle.layout.outputs])
+    return substeps_unseen(vehicle, runs, initial_guess(vehicle, runs)[0], sigma)
+
+
+def _followed_free(vehicle: AbstractVehicle, runs: Runs) -> int:
+    """As many as forces without states need; as `runs` are, where the vehicle diverges however fine its steps.
 
     What is stepped too coarsely moves too slowly, or diverges: steps are shortened until they are as short as asked.
     """
@@ -87,7 +99,7 @@ def substeps_unseen(vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: A
     As `runs` are where it has no effect with states, or diverges however fine its steps. Source: Hairer, Nørsett and
     Wanner (1993), Solving Ordinary Differential Equations I, ch. II.4 (step doubling).
     """
-    if not any(isinstance(effect, AbstractMemory) for effect in vehicle.effects):
+    if not _with_states(vehicle):
         return runs.substeps
     shown = lambda steps: predict(vehicle, dataclasses.replace(runs, substeps=steps), start)
     steps, before = runs.substeps, shown(runs.substeps)
@@ -103,6 +115,11 @@ def substeps_unseen(vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: A
 def substeps_of(turned: float, least: int = 1) -> int:
     """Steps in an interval that is `turned` times the fastest rate long."""
     return int(np.clip(np.ceil(turned / _FOLLOWED), least, FINEST))
+
+
+def _with_states(vehicle: AbstractVehicle) -> bool:
+    """Whether any effect has states."""
+    return any(isinstance(effect, AbstractMemory) for effect in vehicle.effects)
 
 
 def _at_once(vehicle: AbstractVehicle) -> list[AbstractForce]:
