@@ -4,6 +4,10 @@ A notebook whose metadata say `jaxsub.data` needs that data set, and ends with a
 `jaxsub.long` takes minutes and is run with `-m long`.
 """
 
+import json
+import subprocess
+import sys
+
 import jax
 import nbformat
 import pytest
@@ -42,6 +46,17 @@ def test_notebook_runs_without_an_error(name):
     fresh = execute(NOTEBOOKS[name], {"JAX_DISABLE_MOST_OPTIMIZATIONS": "1", "JAX_COMPILATION_CACHE_DIR": kept})
     assert any(cell.outputs for cell in cells(fresh))
     assert not [o for cell in cells(fresh) for o in cell.outputs if o.get("name") == "stderr"]
+
+
+def test_every_call_in_a_notebook_is_one_that_the_package_takes(tmp_path):
+    # at once, for lessons that take minutes to run: that what they import is there, and is called as it is declared
+    kinds = {"typeCheckingMode": "off", "reportCallIssue": "error"}
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(kinds))
+    for name, notebook in KEPT.items():
+        (tmp_path / f"lesson_{name}.py").write_text("\n".join(cell.source for cell in cells(notebook)) + "\n")
+    command = ["pyright", "--pythonpath", sys.executable]
+    checked = subprocess.run([sys.executable, "-m", *command], cwd=tmp_path, capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stdout
 
 
 @pytest.mark.parametrize("name", [name for name in NOTEBOOKS if needs(KEPT[name])])
