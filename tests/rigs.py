@@ -17,7 +17,7 @@ _SMALL = {"hull-compressibility": 3e9, "thermal-expansion": 3e4, "density-strati
 def stacked(vehicle: AbstractVehicle, recordings: list[Recording], substeps: int = 1) -> Runs:
     layout = vehicle.layout
     columns = {"held": layout.held, "interpolated": layout.interpolated, "channels": layout.channels}
-    return stack_runs(recordings, **columns, substeps=substeps)
+    return stack_runs(recordings, **columns, angles=layout.angles, substeps=substeps)
 
 
 def driven(vehicle: AbstractVehicle, times: np.ndarray, seed: int, amplitude: float = 0.1, hold: int = 15) -> Recording:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from jaxsub.cli import session
 from jaxsub.estimate import Problem, gauss_newton, scattered
@@ -98,6 +99,8 @@ def _two_processes(case: Case, starts: np.ndarray) -> dict:
 
 
 def _begin(case: Case, folder: str) -> None:
+    # a core for each process
+    threadpool_limits(1)
     _peer.append(SingleShooting(Model(case), Path(folder)))
 
 

@@ -7,12 +7,17 @@ from typing import Any
 
 import jax
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 
 def pin(cores: int) -> list[int]:
-    """Keep this process, and the threads that it starts from now on, on so many of its cores; which."""
+    """Keep this process, and the threads that it starts from now on, on so many of its cores; which.
+
+    NumPy's linear algebra too, which else has as many threads as there are cores in all, and they wait for each other.
+    """
     chosen = sorted(os.sched_getaffinity(0))[:cores]
     os.sched_setaffinity(0, chosen)
+    threadpool_limits(cores)
     return chosen
 
 

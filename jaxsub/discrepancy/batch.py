@@ -19,7 +19,6 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     longest = max(float(np.diff(r.times).max()) for r in recordings)
     # linear damping is exact at any step; effects that replace it have the same rate and are not
     substeps = substeps_of(longest * fastest)
-    runs = stack_runs(
-        recordings, held=layout.held, interpolated=layout.interpolated, channels=layout.channels, substeps=substeps
-    )
+    columns = {"held": layout.held, "interpolated": layout.interpolated, "channels": layout.channels}
+    runs = stack_runs(recordings, **columns, angles=layout.angles, substeps=substeps)
     return dataclasses.replace(runs, substeps=substeps_free(vehicle, runs))

@@ -22,7 +22,7 @@ from .problem import Problem
 # a search's working set is this many copies of its whitened Jacobian; lanes share what memory there is
 _COPIES, _MEMORY, _LANES = 6, 1.0e9, 8
 # searches that a lane takes one after the other: enough that little time goes by with lanes idle at the end of a share
-_TURNS = 8
+_TURNS = 16
 
 
 class Found(eqx.Module):

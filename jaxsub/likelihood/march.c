@@ -2,7 +2,7 @@
 the model's own functions `step`, `slopes`, `shown`, `shown_slopes`, and the sizes and places in capitals.
 
 S states, N equations, P coefficients, C channels, U signals of an interval, Q numbers that a sample comes with, TH numbers
-of the model that the coefficients move, ND of their derivatives that are not zero. */
+of the model that the coefficients move, ND of their derivatives that are not zero. COUNTED angles are not wrapped. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +13,7 @@ of the model that the coefficients move, ND of their derivatives that are not ze
 #define W (P + Z + 1)
 #define X ((W + 3) / 4 * 4)
 #define NN (N * N)
+#define TURN 6.283185307179586
 #define TABLES 6
 #define TERMS 10
 #define DOUBLINGS 12
@@ -178,6 +179,8 @@ typedef struct {
     V x[S], next[S], u[U], seen[Q], error[C];
     V a[NA + 1], b[NB + 1], c[NC + 1], direct[NX + 1];
     V by[S * X], by_next[S * X], shown_by[C * X], gram[X * X];
+    V turns[C];
+    unsigned char met[C][LANES];
 } Room;
 
 /* Which pairs of member and run the lanes of a block take: one run of many members where there are enough, so that what
@@ -211,14 +214,29 @@ static void prepare(const Given *g, const int64_t *member, int columns, Room *r)
     }
 }
 
+/* Of an angle whose turns are counted, those by which the first sample that was measured is off are no error. */
+static void count(Room *r) {
+    for (int i = 0; i < C; i++) {
+        if (!COUNTED[i]) continue;
+        const V turn = r->seen[Q - C + i] * TURN;
+        EACH(l) if (!r->met[i][l] && turn[l] != 0.0) {
+            r->met[i][l] = 1;
+            r->turns[i][l] = nearbyint(r->error[i][l] / turn[l]);
+        }
+        r->error[i] -= r->turns[i] * turn;
+    }
+}
+
 /* A sample's share of the products, or of the squares. */
 static void look(Room *r, int columns) {
     if (!columns) {
         shown(r->th, r->x, r->seen, r->error);
+        if (COUNTING) count(r);
         for (int i = 0; i < C; i++) r->gram[0] += r->error[i] * r->error[i];
         return;
     }
     shown_slopes(r->th, r->x, r->seen, r->D, r->error, r->c, r->direct);
+    if (COUNTING) count(r);
     apply(r->shown_by, C, C_BEGIN, C_PLACE, r->c, r->by);
     scatter(r->shown_by, C, X_BEGIN, X_PLACE, r->direct);
     for (int i = 0; i < C; i++) {
@@ -251,6 +269,8 @@ static void march(const Given *g, int64_t block, int columns, Room *r) {
     load(r->x, g->start, pair, S);
     memset(r->by, 0, sizeof r->by);
     memset(r->gram, 0, sizeof r->gram);
+    memset(r->turns, 0, sizeof r->turns);
+    memset(r->met, 0, sizeof r->met);
     for (int i = 0; columns && START && i < S; i++) r->by[i * X + P + i] = v_same(g->spread[i]);
     for (int64_t k = 0; k < K; k++) {
         EACH(l) row[l] = ((g->apart ? member[l] * g->runs : 0) + run[l]) * K + k;

@@ -30,10 +30,11 @@ def march_c(model: Sampled, numbers: np.ndarray, moved: np.ndarray, by: np.ndarr
     equations = model.inverse.shape[0]
     sizes = {"N": equations, "P": by.shape[1], "TH": len(moved), "ND": derivatives.nnz(), "START": int(start)}
     sizes |= {"S": functions[0].nnz_out(0), "U": functions[0].nnz_in(2)}
-    sizes |= {"C": functions[2].nnz_out(0), "Q": functions[2].nnz_in(2)}
+    sizes |= {"C": functions[2].nnz_out(0), "Q": functions[2].nnz_in(2), "COUNTING": int(any(runs.counted))}
     weights = moved >= len(numbers) - _WEIGHTS * equations**2
     places = _sources(moved - (len(numbers) - _WEIGHTS * equations**2), weights, by, derivatives)
     sizes |= {"TO": int(np.sum(~weights)), "NDO": int(by[~weights].sum())}
+    places["COUNTED"] = runs.counted
     for name, matrix in slopes.items():
         # by rows, as C goes through them
         pattern = matrix.T.sparsity()
@@ -61,7 +62,7 @@ def _functions(
     full = casadi.SX(casadi.DM(numbers))
     for place, number in enumerate(moved):
         full[int(number)] = th[place]
-    step, shown = _taken_apart(model, len(numbers), sizes["x"], sizes["u"], sizes["z"], channels)
+    step, shown = _taken_apart(model, len(numbers), sizes["x"], sizes["u"], sizes["z"], runs.counted)
     pattern = casadi.Sparsity.triplet(*by.shape, *(list(map(int, where)) for where in np.nonzero(by)))
     D = casadi.SX.sym("D", pattern)
     after = casadi.densify(step(full, x, u))
@@ -95,9 +96,10 @@ def _sources(index: np.ndarray, weights: np.ndarray, by: np.ndarray, pattern: "c
 
 
 def _taken_apart(
-    model: Sampled, count: int, states: int, signals: int, seen: int, channels: int
+    model: Sampled, count: int, states: int, signals: int, seen: int, counted: tuple[bool, ...]
 ) -> tuple["casadi.Function", "casadi.Function"]:
-    """The step and the outputs' errors, of all the model's numbers."""
+    """The step and the outputs' errors, of all the model's numbers; those whose turns are counted not wrapped."""
+    channels = len(counted)
     arrays, rest = eqx.partition(model, eqx.is_inexact_array)
     leaves, structure = jax.tree.flatten(arrays)
     ends = np.cumsum([leaf.size for leaf in leaves])
@@ -113,7 +115,9 @@ def _taken_apart(
     def shown(numbers: Array, x: Array, z: Array) -> Array:
         vehicle = put_together(numbers).vehicle
         time, known, measured, _ = jnp.split(z, [1, seen - 2 * channels, seen - channels])
-        return vehicle.deviation(measured, vehicle.measure(time, x[None], known[None])[0])
+        modelled = vehicle.measure(time, x[None], known[None])[0]
+        wrapped, whole = vehicle.deviation(measured, modelled), measured - modelled
+        return jnp.stack([whole[i] if counted[i] else wrapped[i] for i in range(channels)])
 
     zeros = jnp.zeros
     return (

@@ -4,12 +4,15 @@ $-\ln p(Z\mid\theta, x_0) = \tfrac12\sum_{r,k,c} m_{rkc}\,(z_{rkc} - \hat y_{rkc
 + \sum_c N_c\ln\sigma_c$, with m the mask, one free initial state a run, and $\sigma$ given or concentrated out.
 """
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..recording.runs import Runs
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
+
+_TURN = 2.0 * jnp.pi
 
 
 def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
@@ -18,8 +21,18 @@ def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> 
 
 
 def residual_outputs(vehicle: AbstractVehicle, runs: Runs, modelled: Float[Array, "r k c"]) -> Float[Array, "r k c"]:
-    """Measured minus `modelled`; angles wrapped to (-π, π], zero where nothing was measured."""
-    return jnp.where(runs.mask, vehicle.deviation(runs.outputs, modelled), 0.0)
+    """Measured minus `modelled`, zero where nothing was measured.
+
+    Angles are wrapped to (-π, π]. Where their turns are counted only the first sample's is: a model that turns once too
+    often is a turn off, and not right again, so that a search that begins far off finds the way back.
+    """
+    error = jnp.where(runs.mask, vehicle.deviation(runs.outputs, modelled), 0.0)
+    if not any(runs.counted):
+        return error
+    whole = jnp.where(runs.mask, runs.outputs - modelled, 0.0)
+    first = jnp.take_along_axis(whole, jnp.argmax(runs.mask, axis=1)[:, None], axis=1)
+    whole = jnp.where(runs.mask, whole - _TURN * jax.lax.stop_gradient(jnp.round(first / _TURN)), 0.0)
+    return jnp.where(jnp.array(runs.counted), whole, error)
 
 
 def concentrated_sigma(error: Float[Array, "r k c"], runs: Runs) -> Float[Array, " c"]:

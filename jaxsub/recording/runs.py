@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from .recording import Recording
+from .turns import without_jumps
 
 
 class Runs(eqx.Module):
@@ -21,6 +22,7 @@ class Runs(eqx.Module):
     - `live`: (R, K-1) false where padded.
     - `signals`: (R, K, m) input columns; `held`: for each, whether it is held between samples or interpolated.
     - `outputs`: (R, K, c) measured channels, zero where missing; `mask`: (R, K, c) true where measured.
+    - `counted`: for each channel, whether it is an angle whose whole turns are counted, so that it has no jumps.
     - `substeps`: integration steps in each sample interval.
     """
 
@@ -32,6 +34,7 @@ class Runs(eqx.Module):
     outputs: Float[Array, "r k c"]
     mask: Bool[Array, "r k c"]
     held: tuple[bool, ...] = eqx.field(static=True)
+    counted: tuple[bool, ...] = eqx.field(static=True)
     substeps: int = eqx.field(static=True, default=1)
 
     def nodes(self) -> Float[Array, "r k1 3 m1"]:
@@ -88,20 +91,26 @@ def stack_runs(
     held: Sequence[str],
     interpolated: Sequence[str],
     channels: Sequence[str],
+    angles: Sequence[str] = (),
     substeps: int = 1,
 ) -> Runs:
     """The batch of `recordings` with those columns as held inputs, interpolated inputs and outputs.
+
+    The turns of those that are `angles` are counted, where all recordings tell how many there are.
 
     **Raises** `InputError` for a column that is absent and for a gap in an input column.
     """
     length = max(len(r.times) for r in recordings)
     pad = lambda a, fill: np.concatenate([a, np.broadcast_to(fill, (length - len(a), *a.shape[1:]))])
     times, signals, outputs, spacing = [], [], [], []
-    for recording in recordings:
+    whole = {name: [without_jumps(r.times, r.column(name)) for r in recordings] for name in angles}
+    whole = {name: found for name, found in whole.items() if all(angle is not None for angle in found)}
+    for index, recording in enumerate(recordings):
         t = recording.times - recording.times[0]
         dt = np.diff(t)
         table = recording.inputs([*held, *interpolated])
-        measured = np.stack([recording.column(name) for name in channels], axis=1)
+        columns = [whole[name][index] if name in whole else recording.column(name) for name in channels]
+        measured = np.stack(columns, axis=1)
         times.append(np.concatenate([t, t[-1] + dt[-1] * np.arange(1, length - len(t) + 1)]))
         signals.append(pad(table, table[-1]))
         outputs.append(pad(measured, np.nan))
@@ -120,6 +129,7 @@ def stack_runs(
         jnp.asarray(np.where(np.isnan(z), 0.0, z)),
         jnp.asarray(~np.isnan(z)),
         (True,) * len(held) + (False,) * len(interpolated),
+        tuple(name in whole for name in channels),
         substeps,
     )
 

@@ -80,6 +80,12 @@ class Layout:
         return tuple(output.channel for output in self.outputs)
 
     @property
+    def angles(self) -> tuple[str, ...]:
+        """The measured channels that a whole turn leaves as they are."""
+        body = self.kind == "submerged-body"
+        return tuple(channel for channel in self.channels if channel in _ANGLES and body)
+
+    @property
     def states(self) -> tuple[str, ...]:
         """Names of the states: velocities of the free equations (`v` of a body, `x_rate` of a mechanism), positions."""
         body = self.kind == "submerged-body"
@@ -240,7 +246,7 @@ class AbstractVehicle(eqx.Module):
     def deviation(self, measured: Float[Array, "*k c"], modelled: Float[Array, "*k c"]) -> Float[Array, "*k c"]:
         """`measured` minus `modelled` channels; angles of a body wrapped to (-π, π]."""
         difference = measured - modelled
-        turns = jnp.array([c in _ANGLES and self.layout.kind == "submerged-body" for c in self.layout.channels])
+        turns = jnp.array([channel in self.layout.angles for channel in self.layout.channels], bool)
         return jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
 
 

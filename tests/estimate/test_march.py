@@ -29,6 +29,17 @@ def problem(vehicle, lengths=(40, 25), substeps=1, known_start=False, **options)
     return Problem.of(vehicle, runs, sigma, known_start=known_start)
 
 
+def turning(made):
+    """A problem whose heading is measured many turns on, as is the guess in the second run."""
+    layout = made.vehicle.layout
+    heading, state = layout.channels.index("psi"), layout.states.index("psi")
+    assert made.runs.counted[heading]
+    more = 2.0 * jnp.pi * jnp.array([[1.0], [0.0]]) + jnp.linspace(0.0, 20.0, made.runs.times.shape[1])
+    outputs = jnp.where(made.runs.mask, made.runs.outputs.at[..., heading].add(more), 0.0)
+    guess = made.guess.at[1, state].add(-4.0 * jnp.pi)
+    return dataclasses.replace(made, runs=dataclasses.replace(made.runs, outputs=outputs), guess=guess)
+
+
 FEW = ("quadratic-damping", "fluid-memory", "current", "sensor-scale")
 
 
@@ -46,6 +57,7 @@ CASES = {
     "mechanism": lambda: problem(coupled(), substeps=2),
     "known start": lambda: problem(coupled(), known_start=True),
     "body": lambda: problem(laden(FEW), lengths=(6, 5), amplitude=0.02),
+    "turns": lambda: turning(problem(body(), lengths=(30, 20), amplitude=0.3)),
     "every effect": lambda: problem(laden(), lengths=(6, 5), amplitude=0.02),
 }
 PARAMS = [pytest.param(case, marks=[pytest.mark.long] * (case == "every effect")) for case in CASES]

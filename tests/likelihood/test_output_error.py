@@ -64,15 +64,32 @@ def test_missing_cells_of_a_recording_are_unmeasured(case):
     assert np.isfinite(nll(vehicle, runs, at_rest(vehicle, 1) + 0.01))
 
 
+def six_samples(vehicle, counted):
+    """A run of a body as it would have been measured without noise, the turns of its angles counted or not."""
+    runs = stacked(vehicle, [driven(vehicle, 0.2 * np.arange(6), seed=1)])
+    counted = tuple(counted and channel in vehicle.layout.angles for channel in vehicle.layout.channels)
+    shown = simulate(vehicle, runs, at_rest(vehicle, 1))
+    return dataclasses.replace(runs, mask=jnp.ones_like(runs.mask), outputs=shown, counted=counted)
+
+
 def test_whole_turns_of_an_angle_are_no_error():
     vehicle = nps_auv_ii()
-    runs = stacked(vehicle, [driven(vehicle, 0.2 * np.arange(6), seed=1)])
-    runs = dataclasses.replace(
-        runs, mask=jnp.ones_like(runs.mask), outputs=simulate(vehicle, runs, at_rest(vehicle, 1))
-    )
+    runs = six_samples(vehicle, counted=False)
     heading = vehicle.layout.channels.index("psi")
     turned = dataclasses.replace(runs, outputs=runs.outputs.at[0, 2:, heading].add(2.0 * np.pi))
     np.testing.assert_allclose(residuals(vehicle, turned, at_rest(vehicle, 1)), 0.0, atol=1e-12)
     speed = vehicle.layout.channels.index("u")
     faster = dataclasses.replace(runs, outputs=runs.outputs.at[0, 2:, speed].add(2.0 * np.pi))
     np.testing.assert_allclose(residuals(vehicle, faster, at_rest(vehicle, 1))[0, 2:, speed], 2.0 * np.pi)
+
+
+def test_turns_that_are_counted_are_an_error_but_for_those_of_the_first_sample_measured():
+    vehicle = nps_auv_ii()
+    runs = six_samples(vehicle, counted=True)
+    heading = vehicle.layout.channels.index("psi")
+    runs = dataclasses.replace(runs, mask=runs.mask.at[0, 0, heading].set(False))
+    turn, start = 2.0 * np.pi, at_rest(vehicle, 1)
+    once = dataclasses.replace(runs, outputs=runs.outputs.at[0, :, heading].add(turn))
+    np.testing.assert_allclose(residuals(vehicle, once, start), 0.0, atol=1e-12)
+    more = dataclasses.replace(runs, outputs=runs.outputs.at[0, 3:, heading].add(turn))
+    np.testing.assert_allclose(residuals(vehicle, more, start)[0, :, heading], [0, 0, 0, turn, turn, turn], atol=1e-12)
