@@ -11,7 +11,7 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingImports]
 
 from jaxsub.cli import session
 from jaxsub.estimate import Problem, gauss_newton, scattered

@@ -7,7 +7,7 @@ from typing import Any
 
 import jax
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingImports]
 
 
 def pin(cores: int) -> list[int]:

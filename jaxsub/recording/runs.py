@@ -103,8 +103,7 @@ def stack_runs(
     length = max(len(r.times) for r in recordings)
     pad = lambda a, fill: np.concatenate([a, np.broadcast_to(fill, (length - len(a), *a.shape[1:]))])
     times, signals, outputs, spacing = [], [], [], []
-    whole = {name: [without_jumps(r.times, r.column(name)) for r in recordings] for name in angles}
-    whole = {name: found for name, found in whole.items() if all(angle is not None for angle in found)}
+    whole = {name: found for name in angles if (found := _without_jumps(recordings, name))}
     for index, recording in enumerate(recordings):
         t = recording.times - recording.times[0]
         dt = np.diff(t)
@@ -132,6 +131,17 @@ def stack_runs(
         tuple(name in whole for name in channels),
         substeps,
     )
+
+
+def _without_jumps(recordings: Sequence[Recording], name: str) -> list[np.ndarray]:
+    """An angle of each recording, its turns counted; none where one of them leaves these in doubt."""
+    found = []
+    for recording in recordings:
+        angle = without_jumps(recording.times, recording.column(name))
+        if angle is None:
+            return []
+        found.append(angle)
+    return found
 
 
 def _group(intervals: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray]:
