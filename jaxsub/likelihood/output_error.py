@@ -26,13 +26,13 @@ def residual_outputs(vehicle: AbstractVehicle, runs: Runs, modelled: Float[Array
     Angles are wrapped to (-π, π]. Where their turns are counted only the first sample's is: a model that turns once too
     often is a turn off, and not right again, so that a search that begins far off finds the way back.
     """
-    error = jnp.where(runs.mask, vehicle.deviation(runs.outputs, modelled), 0.0)
-    if not any(runs.counted):
-        return error
-    whole = jnp.where(runs.mask, runs.outputs - modelled, 0.0)
-    first = jnp.take_along_axis(whole, jnp.argmax(runs.mask, axis=1)[:, None], axis=1)
-    whole = jnp.where(runs.mask, whole - _TURN * jax.lax.stop_gradient(jnp.round(first / _TURN)), 0.0)
-    return jnp.where(jnp.array(runs.counted), whole, error)
+    error = vehicle.deviation(runs.outputs, modelled)
+    if any(runs.counted):
+        whole = runs.outputs - modelled
+        first = jnp.take_along_axis(whole, jnp.argmax(runs.mask, axis=1)[:, None], axis=1)
+        whole = whole - _TURN * jax.lax.stop_gradient(jnp.round(first / _TURN))
+        error = jnp.where(jnp.array(runs.counted), whole, error)
+    return jnp.where(runs.mask, error, 0.0)
 
 
 def concentrated_sigma(error: Float[Array, "r k c"], runs: Runs) -> Float[Array, " c"]:

@@ -3,8 +3,6 @@
 import numpy as np
 from jaxtyping import Float
 
-_TURN = 2.0 * np.pi
-
 
 def without_jumps(times: Float[np.ndarray, " k"], angle: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"] | None:
     """An angle (rad, NaN where nothing was measured) that goes on over whole turns; None where these are in doubt.
@@ -14,11 +12,7 @@ def without_jumps(times: Float[np.ndarray, " k"], angle: Float[np.ndarray, " k"]
     gap in which it may have turned about, are left as they were recorded.
     """
     measured = np.flatnonzero(np.isfinite(angle))
-    change, between = np.diff(angle[measured]), np.diff(times[measured])
-    turns = np.round(change / _TURN)
-    fastest = np.max(np.abs(change - _TURN * turns) / between, initial=0.0)
-    if fastest * np.max(between, initial=0.0) >= 0.25 * _TURN:
-        return None
-    whole = angle.copy()
-    whole[measured[1:]] -= _TURN * np.cumsum(turns)
-    return whole
+    whole, between = angle.copy(), np.diff(times[measured])
+    whole[measured] = np.unwrap(angle[measured])
+    fastest = np.max(np.abs(np.diff(whole[measured])) / between, initial=0.0)
+    return whole if fastest * np.max(between, initial=0.0) < 0.5 * np.pi else None
