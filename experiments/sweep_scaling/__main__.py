@@ -22,7 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments.parts import main
-from jaxsub.estimate import gauss_newton, method
+from jaxsub.estimate import gauss_newton, method, share_for
 from jaxsub.sweep import open_sweep, sweep
 
 from .case import longer, plan
@@ -37,8 +37,8 @@ _NUMBERS = ("initial_guess", "estimate", "standard_error", "cost", "coordinates"
 
 
 def sizes(quick: bool) -> list[int]:
-    """Searches in each sweep."""
-    return [64, 128, 256] if quick else [64, 128, 256, 512, 1024]
+    """Searches in each sweep, all of them cut into shares of one size: other shares are other programs."""
+    return [128, 256, 512] if quick else [128, 256, 512, 1024]
 
 
 def part(name: str, out: Path, quick: bool) -> dict:
@@ -63,9 +63,8 @@ def timed(stores: Path, quick: bool, address: str | None, *, compiled: bool = Fa
     planned = lambda count: dataclasses.replace(plan(quick, count), compiled=compiled)
     with tempfile.TemporaryDirectory() as scratch:
         begin = clock()
-        # a share of the smallest sweep is a program of its own; two chunks, so that both devices or workers compile
-        for count in (sizes(quick)[0], 2 * sizes(quick)[0]):
-            sweep(planned(count), Path(scratch) / str(count), cluster=address)
+        # two shares, so that both devices or workers compile
+        sweep(planned(2 * share_for(planned(1).problems[0])), Path(scratch), cluster=address)
         first = clock() - begin
     seconds = []
     for size in sizes(quick):
