@@ -18,7 +18,6 @@ from .plant import Plant
 from .sequential import Sequential
 from .trim import require_trim, trim
 
-_ANGLES = ("phi", "theta", "psi")
 # m and rad: as large as an operator would forgive
 _SCALE = {"z": 0.5, "psi": 0.09}
 
@@ -114,7 +113,7 @@ class Mpc(eqx.Module):
             tuple(track), columns(track.values()), effort * amplitude, pace * rate, require_trim(plant, trim(plant)).u,
             amplitude, rate, tuple(within), columns(low for low, _ in within.values()),
             columns(high for _, high in within.values()), columns([give])[0],
-            tuple(name in _ANGLES and layout.kind == "submerged-body" for name in track),
+            tuple(layout.is_angle(name) for name in track),
         )  # fmt: skip
         return cls(plant, weights, nodes, tolerance, steps)
 

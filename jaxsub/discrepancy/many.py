@@ -16,7 +16,7 @@ from .model import p_value
 from .name import Named, asked_still, named_on, refitted, standing
 from .selector import SIGNIFICANCE, Selector
 from .show import Luck, luck
-from .trial import Model, Trial, Tries, upright, worth_trying
+from .trial import Model, Trial, Tries, rivals, upright, worth_trying
 from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
 
 # effects beyond which no more are sought, and sets that may be refused
@@ -104,12 +104,14 @@ class _Search:
         said, every = [], self.listed(best, present=True)
         for one in named:
             one, others = self._beside(best, every, one)
-            models = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
-            models = [(effect, model) for effect, model in models if model.stands] or models[:1]
-            values = [(effect, -float(model.fit.cost)) for effect, model in models]
-            effect, model = models[int(np.argmax([value for _, value in values]))]
+            tried = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
+            tried = [(effect, model) for effect, model in tried if model.admitted] or tried[:1]
+            values = rivals([model for _, model in tried], [-float(model.fit.cost) for _, model in tried])
+            fits = [(effect, value) for (effect, _), value in zip(tried, values, strict=True)]
+            worth = [(model.stands, value) for (_, model), value in zip(tried, values, strict=True)]
+            effect, model = tried[worth.index(max(worth))]
             if model is best:
-                said.append(refitted(one, values))
+                said.append(refitted(one, fits))
             else:
                 best, every = model, self.listed(model, present=True)
                 said.append(self._beside(best, every, dataclasses.replace(one, effect=effect))[0])

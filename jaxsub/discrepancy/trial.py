@@ -18,6 +18,7 @@ from .model import freed, join, p_value, sound, told
 from .name import Named, Naming, named_on, refitted, standing
 from .programs import make_room
 from .progress import Progress
+from .rivals import told_apart
 from .selector import SIGNIFICANCE, Selector
 from .show import HeldOut, Luck, hold, luck
 from .stiffness import substeps_for, substeps_unseen
@@ -66,9 +67,14 @@ class Model(NamedTuple):
     added: tuple[AbstractEffect, ...]
 
     @property
+    def admitted(self) -> bool:
+        """Whether all came out of the fit as physics admits."""
+        return sound(self.fit, self.added)
+
+    @property
     def stands(self) -> bool:
-        """Whether all came out of the fit as physics admits, and the recordings tell each beside the others."""
-        return sound(self.fit, self.added) and told(self.view, self.added)
+        """Whether moreover the recordings tell each beside the others."""
+        return self.admitted and told(self.view, self.added)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -119,6 +125,12 @@ class Trial:
     def all_runs(self, substeps: int) -> Runs:
         """The runs with so many steps in a sample interval."""
         return dataclasses.replace(self.runs, substeps=substeps)
+
+
+def rivals(models: Sequence[Model], evidence: Sequence[float]) -> list[float]:
+    """Log evidence of models in each other's place by all runs, of that by the runs that they were fitted to."""
+    samples = int(np.sum(np.any(np.asarray(models[0].view.followed.system.measured), axis=-1)))
+    return told_apart(evidence, [model.shown for model in models], samples)
 
 
 class Tries:
@@ -188,16 +200,25 @@ class Tries:
         return luck(before, after, self.sound(more) and kept, freely=self.freely)
 
     def value(self, numbers: Sequence[int]) -> float:
-        """Log evidence of the fit with these; minus infinity where they are not sound."""
+        """Log evidence of the fit with these; minus infinity where physics does not admit its numbers."""
         key = tuple(sorted(numbers))
         if key not in self.values:
-            self.values[key] = evidence_of(self.model(key).view) if self.sound(key) else -np.inf
+            model = self.model(key)
+            self.values[key] = evidence_of(model.view) if model.admitted else -np.inf
         return self.values[key]
 
     def closest(self, others: Sequence[int], index: int) -> Fits:
-        """A candidate and its twins with the log evidence of their fits, the `others` beside them; the best first."""
+        """A candidate and its twins, the `others` beside them, with the log evidence of all runs; the best first.
+
+        Those whose fits do not stand come last: what the recordings do not tell from nothing beside a coefficient that
+        does the same may be as probable as what they do, and is its rival.
+        """
         twins = [number for number in named_on(self.found.selector, others, index).twins if number not in others]
-        return sorted([(i, self.value([*others, i])) for i in (index, *twins)], key=lambda fit: -fit[1])
+        numbers = [index, *twins]
+        models = [self.model([*others, i]) for i in numbers]
+        values = rivals(models, [self.value([*others, i]) for i in numbers])
+        fits = zip(numbers, values, strict=True)
+        return sorted(fits, key=lambda fit: (not self.sound([*others, fit[0]]), -fit[1]))
 
 
 def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
@@ -239,13 +260,13 @@ def upright(tries: Tries, chosen: Sequence[int]) -> Sequence[int]:
 
 
 def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
-    """The first that stands by itself of `chosen` and their twins, the most probable fit first; with those after it.
+    """The first that stands by itself of `chosen` and their twins, the most probable fit first; with its rivals.
 
     A twin that the training runs find more probable and the held-out runs refuse is none of its rivals.
     """
     for fits in sorted((tries.closest([], index) for index in chosen), key=lambda fits: -fits[0][1]):
-        for place, (index, value) in enumerate(fits):
-            if np.isfinite(value) and tries.helps([], index):
+        for place, (index, _) in enumerate(fits):
+            if tries.sound([index]) and tries.helps([], index):
                 return {index: fits[place:]}
     return {}
 

@@ -82,8 +82,11 @@ class Layout:
     @property
     def angles(self) -> tuple[str, ...]:
         """The measured channels that a whole turn leaves as they are."""
-        body = self.kind == "submerged-body"
-        return tuple(channel for channel in self.channels if channel in _ANGLES and body)
+        return tuple(channel for channel in self.channels if self.is_angle(channel))
+
+    def is_angle(self, channel: str) -> bool:
+        """Whether a whole turn leaves a channel as it is, as it does a body's Euler angles."""
+        return self.kind == "submerged-body" and channel in _ANGLES
 
     @property
     def states(self) -> tuple[str, ...]:

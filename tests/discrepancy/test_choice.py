@@ -119,27 +119,48 @@ def test_a_limit_that_nothing_reaches_is_not_told(rate):
 
 
 class Fitted(Tries):
-    """A candidate 0 and its twins 1 and 2 with the evidence of their fits, and who of them stands."""
+    """A candidate 0 and its twins 1, 2 and 3: the evidence of their fits, and whom the held-out runs ask for.
 
-    def __init__(self):
-        self.fits, self.stand = [(0, 30.0), (1, 20.0), (2, -np.inf)], ()
+    2 has a sign that physics forbids, and 3 is not told.
+    """
 
-    def closest(self, others, index):
-        return self.fits
+    def __init__(self, *asked):
+        self.values, self.asked = {(0,): 30.0, (1,): 20.0, (2,): -np.inf, (3,): 31.0}, asked
+        self.found = SimpleNamespace(selector=None)
+
+    def model(self, numbers):
+        return None
+
+    def sound(self, numbers):
+        return numbers[0] in (0, 1)
 
     def helps(self, fewer, more):
-        assert np.isfinite(dict(self.fits)[more])
-        return more in self.stand
+        assert self.sound([more])
+        return more in self.asked
 
 
-def test_a_twin_that_the_held_out_runs_refuse_gives_way_to_the_next():
-    """Claim: the most probable that stands is taken, what was refused before it is no rival, an unsound fit none."""
-    tries = Fitted()
-    assert alone(tries, [0]) == {}
-    tries.stand = (1,)
-    assert alone(tries, [0]) == {1: [(1, 20.0), (2, -np.inf)]}
-    tries.stand = (0, 1)
-    assert alone(tries, [0]) == {0: tries.fits}
+def test_a_twin_that_the_held_out_runs_refuse_gives_way_to_the_next(monkeypatch):
+    """Claim: the most probable that stands is taken, what was refused before is no rival, what is not told is one."""
+    path = sys.modules["jaxsub.discrepancy.trial"]
+    monkeypatch.setattr(path, "named_on", lambda *_: SimpleNamespace(twins=[1, 2, 3]))
+    monkeypatch.setattr(path, "rivals", lambda models, evidence: evidence)
+    untold = [(3, 31.0), (2, -np.inf)]
+    assert alone(Fitted(), [0]) == {}
+    assert alone(Fitted(1), [0]) == {1: [(1, 20.0), *untold]}
+    assert alone(Fitted(0, 1), [0]) == {0: [(0, 30.0), (1, 20.0), *untold]}
+
+
+@pytest.mark.parametrize("admitted", [True, False])
+def test_a_fit_that_physics_admits_has_evidence_whether_it_is_told_or_not(monkeypatch, admitted):
+    """Claim: what is not told from nothing has the evidence of its fit, and what physics forbids has none."""
+    path = sys.modules["jaxsub.discrepancy.trial"]
+    for name, answer in (("evidence_of", 7.0), ("told", False), ("sound", admitted)):
+        monkeypatch.setattr(path, name, lambda *_, answer=answer: answer)
+    tries = object.__new__(Tries)
+    tries.found = SimpleNamespace(naming=SimpleNamespace(products=SimpleNamespace(disturbance=None)))
+    tries.models, tries.values = {(0,): Model(None, None, None, ())}, {}
+    assert not tries.sound([0])
+    assert tries.value([0]) == (7.0 if admitted else -np.inf)
 
 
 class Sets(Tries):
