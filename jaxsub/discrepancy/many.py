@@ -16,7 +16,7 @@ from .model import p_value
 from .name import Named, asked_still, named_on, refitted, standing
 from .selector import SIGNIFICANCE, Selector
 from .show import Luck, luck
-from .trial import Model, Trial, Tries, rivals, upright, worth_trying
+from .trial import Model, Trial, Tries, by_all_runs, upright, worth_trying
 from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
 
 # effects beyond which no more are sought, and sets that may be refused
@@ -106,7 +106,7 @@ class _Search:
             one, others = self._beside(best, every, one)
             tried = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
             tried = [(effect, model) for effect, model in tried if model.admitted] or tried[:1]
-            values = rivals([model for _, model in tried], [-float(model.fit.cost) for _, model in tried])
+            values = by_all_runs([model for _, model in tried], [-float(model.fit.cost) for _, model in tried])
             fits = [(effect, value) for (effect, _), value in zip(tried, values, strict=True)]
             worth = [(model.stands, value) for (_, model), value in zip(tried, values, strict=True)]
             effect, model = tried[worth.index(max(worth))]

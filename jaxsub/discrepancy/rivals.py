@@ -13,10 +13,10 @@ _TINY = 1e-300
 def told_apart(evidence: Sequence[float], shown: Sequence[HeldOut], samples: int) -> list[float]:
     r"""Log evidence of models by all runs: by `samples` that they were fitted to, and what is `shown` on the others.
 
-    As the others are predicted from those fitted, evidence is of both, $\ln p(y) + \ln p(y' | y)$. By how much a model
-    is behind the best is what `believed` of it, the variance that of sums over B blocks of the others,
-    $s^2 = (1 + n/n') B\,\mathrm{var}(t)$, with n' samples and the n that were fitted taken to be like them. Only the
-    evidence counts where all diverge along the others.
+    As the others are predicted from those fitted, evidence is of both, $\ln p(y) + \ln p(y' | y)$. A model is behind
+    the best by as much of that as is `believed`, whose variance is told by B blocks of the n' other samples,
+    $s^2 = (1 + n/n') B\,\mathrm{var}(t)$ with t by how much each prefers the best: the n that were fitted are taken to
+    be like them. Only the evidence of the fits counts where all diverge along the others.
     """
     whole = np.array(evidence) + [sum(float(run.sum()) for run in one.expected) for one in shown]
     best = int(np.argmax(whole))

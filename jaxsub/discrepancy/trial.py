@@ -127,7 +127,7 @@ class Trial:
         return dataclasses.replace(self.runs, substeps=substeps)
 
 
-def rivals(models: Sequence[Model], evidence: Sequence[float]) -> list[float]:
+def by_all_runs(models: Sequence[Model], evidence: Sequence[float]) -> list[float]:
     """Log evidence of models in each other's place by all runs, of that by the runs that they were fitted to."""
     samples = int(np.sum(np.any(np.asarray(models[0].view.followed.system.measured), axis=-1)))
     return told_apart(evidence, [model.shown for model in models], samples)
@@ -216,7 +216,7 @@ class Tries:
         twins = [number for number in named_on(self.found.selector, others, index).twins if number not in others]
         numbers = [index, *twins]
         models = [self.model([*others, i]) for i in numbers]
-        values = rivals(models, [self.value([*others, i]) for i in numbers])
+        values = by_all_runs(models, [self.value([*others, i]) for i in numbers])
         fits = zip(numbers, values, strict=True)
         return sorted(fits, key=lambda fit: (not self.sound([*others, fit[0]]), -fit[1]))
 

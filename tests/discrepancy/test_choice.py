@@ -143,7 +143,7 @@ def test_a_twin_that_the_held_out_runs_refuse_gives_way_to_the_next(monkeypatch)
     """Claim: the most probable that stands is taken, what was refused before is no rival, what is not told is one."""
     path = sys.modules["jaxsub.discrepancy.trial"]
     monkeypatch.setattr(path, "named_on", lambda *_: SimpleNamespace(twins=[1, 2, 3]))
-    monkeypatch.setattr(path, "rivals", lambda models, evidence: evidence)
+    monkeypatch.setattr(path, "by_all_runs", lambda models, evidence: evidence)
     untold = [(3, 31.0), (2, -np.inf)]
     assert alone(Fitted(), [0]) == {}
     assert alone(Fitted(1), [0]) == {1: [(1, 20.0), *untold]}
