@@ -107,11 +107,10 @@ class _Search:
             tried = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
             tried = [(effect, model) for effect, model in tried if model.admitted] or tried[:1]
             values = by_all_runs([model for _, model in tried], [-float(model.fit.cost) for _, model in tried])
-            fits = [(effect, value) for (effect, _), value in zip(tried, values, strict=True)]
-            worth = [(model.stands, value) for (_, model), value in zip(tried, values, strict=True)]
-            effect, model = tried[worth.index(max(worth))]
+            fits = [(effect, model, value) for (effect, model), value in zip(tried, values, strict=True)]
+            effect, model, _ = max(fits, key=lambda fit: (fit[1].stands, fit[2]))
             if model is best:
-                said.append(refitted(one, fits))
+                said.append(refitted(one, [(effect, value) for effect, _, value in fits]))
             else:
                 best, every = model, self.listed(model, present=True)
                 said.append(self._beside(best, every, dataclasses.replace(one, effect=effect))[0])

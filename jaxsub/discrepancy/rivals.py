@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from .show import HeldOut, block_sums
+from .show import HeldOut, block_gains
 
 _TINY = 1e-300
 
@@ -28,7 +28,7 @@ def told_apart(evidence: Sequence[float], shown: Sequence[HeldOut], samples: int
     for i, one in enumerate(shown):
         if not np.isfinite(whole[i]):
             continue
-        blocks = block_sums([a - b for a, b in zip(leader, one.expected, strict=True)])
+        blocks = block_gains(leader, one.expected)
         variance = (1.0 + samples / max(others, 1)) * len(blocks) * float(np.var(blocks, ddof=1))
         whole[i] = whole[best] - believed(whole[best] - whole[i], variance)
     return whole.tolist()

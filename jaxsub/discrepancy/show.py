@@ -172,14 +172,15 @@ def _gained(more: Sequence[np.ndarray], less: Sequence[np.ndarray], count: int) 
     """
     rng = np.random.default_rng(0)
     with np.errstate(invalid="ignore"):
-        blocks = block_sums([a - b for a, b in zip(more, less, strict=True)], count)
+        blocks = block_gains(more, less, count)
         drawn = rng.choice(blocks, (_DRAWS, len(blocks))).sum(axis=1)
         return float(blocks.sum()), float((1 + np.sum(~(drawn > 0.0))) / (1 + _DRAWS))
 
 
-def block_sums(samples: Sequence[np.ndarray], count: int = _BLOCKS) -> np.ndarray:
-    """The sum over each of `count` blocks of the samples (K,) of every run."""
-    return np.concatenate([[part.sum() for part in np.array_split(run, count)] for run in samples])
+def block_gains(more: Sequence[np.ndarray], less: Sequence[np.ndarray], count: int = _BLOCKS) -> np.ndarray:
+    """Differences of samples (K,) of every run, their sum over each of `count` blocks of it."""
+    gains = [a - b for a, b in zip(more, less, strict=True)]
+    return np.concatenate([[part.sum() for part in np.array_split(gain, count)] for gain in gains])
 
 
 def overlays(

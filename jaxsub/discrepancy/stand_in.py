@@ -140,7 +140,7 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
     for share in _SHARES:
         less = dataclasses.replace(force, spread=share * force.spread)
         more = _fitted(trial, named, base, [less], disturbance)
-        gain = luck(base.shown, more.shown, sound(more.fit, more.added), freely=False)
+        gain = luck(base.shown, more.shown, more.admitted, freely=False)
         freely = gain._replace(freely=True)
         gain = freely if _helpful(freely) and not gain.helps else gain
         if gain.helps and more.view.finite:
