@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import special
+from scipy import special, stats
 
 from .show import HeldOut, block_gains
 
-_TINY = 1e-300
+# the least variance of a difference in log evidence: of models that expect the same it is none
+_TINY = 1e-12
 
 
 def told_apart(evidence: Sequence[float], shown: Sequence[HeldOut], samples: int) -> list[float]:
@@ -46,13 +47,9 @@ def believed(ahead: float, variance: float) -> float:
     \frac{w}{1-w} = \frac{N(T; s^2/2, s^2) + N(T; -s^2/2, s^2)}{2\,N(T; 0, s^2 + s^4/4)}$
     """
     variance = max(variance, _TINY)
-    spread = variance * (1.0 + 0.25 * variance)
-    one = np.logaddexp(_normal(ahead - 0.5 * variance, variance), _normal(ahead + 0.5 * variance, variance))
-    odds = one - np.log(2.0) - _normal(ahead, spread)
+    s = np.sqrt(variance)
+    either = np.logaddexp(*stats.norm.logpdf(ahead, [0.5 * variance, -0.5 * variance], s))
+    odds = either - np.log(2.0) - stats.norm.logpdf(ahead, 0.0, np.hypot(s, 0.5 * variance))
     right, neither = special.log_expit(odds), special.log_expit(-odds)
-    share = lambda t: np.logaddexp(right + special.log_expit(t), neither + special.log_ndtr(t / np.sqrt(variance)))
+    share = lambda t: np.logaddexp(right + special.log_expit(t), neither + special.log_ndtr(t / s))
     return min(ahead, float(share(ahead) - share(-ahead)))
-
-
-def _normal(x: float, variance: float) -> float:
-    return -0.5 * (np.log(2.0 * np.pi * variance) + x**2 / variance)
