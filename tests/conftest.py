@@ -1,7 +1,10 @@
 """What every test starts from: 64-bit numbers, annotated shapes checked at each call, compiled code kept."""
 
+import contextlib
 import gc
+import importlib
 import os
+import warnings
 from collections.abc import Iterator
 
 import jax
@@ -30,6 +33,15 @@ def pytest_configure(config: pytest.Config) -> None:
     if cache := getattr(config, "cache", None):
         jax.config.update("jax_compilation_cache_dir", str(cache.mkdir("jax")))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    if not hasattr(config, "workerinput"):
+        _date_arviz()
+
+
+def _date_arviz() -> None:
+    """arviz warns at its first import of a day, and two workers that date the warning at once fail: it is dated here."""
+    with warnings.catch_warnings(), contextlib.suppress(ImportError):
+        warnings.simplefilter("ignore", FutureWarning)
+        importlib.import_module("arviz")
 
 
 @pytest.fixture(autouse=True)
