@@ -38,7 +38,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def _date_arviz() -> None:
-    """arviz warns at its first import of a day, and two workers that date the warning at once fail: it is dated here."""
+    """arviz dates the warning of its first import of a day, and two workers at once fail at that: it is dated here."""
     with warnings.catch_warnings(), contextlib.suppress(ImportError):
         warnings.simplefilter("ignore", FutureWarning)
         importlib.import_module("arviz")

@@ -12,6 +12,7 @@ from .programs import make_room
 from .progress import Progress
 from .selector import Selector
 from .trial import Found
+from .tuned import tuned
 from .view import View, facts
 from .whiteness import RANDOM, Memory, memory
 
@@ -25,7 +26,7 @@ def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, *, p
     """All that the recordings of a view may ask for and that its vehicle does not have; or also what is `present`."""
     make_room()
     there = set() if present else {effect.label for effect in view.vehicle.effects}
-    known = facts(view)
+    known = tuned(view, facts(view))
     effects = [effect for effect in candidates(known, vocabulary) if effect.label not in there]
     columns, owners = candidate_columns(view, effects)
     return Selector(Evidence.of(view, columns), effects, owners, looked_at(known, vocabulary))
