@@ -9,9 +9,13 @@ import dataclasses
 import math
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
+
+# of the way to a bound, the most that a step goes; and a slope so close to one that nothing is left to go
+_PART, _TINY = 0.9, 1e-300
 
 
 def number(value: ArrayLike) -> Array:
@@ -85,6 +89,23 @@ class Transform(eqx.Module):
         both = jnp.log(fraction) - jnp.log1p(-fraction)
         one = gap + jnp.log(-jnp.expm1(-gap))
         return jnp.where(low & high, both, jnp.where(low | high, one, (theta - self.centre) / self.scale))
+
+    def stepped(self, y: Float[Array, " p"], step: Float[Array, " p"]) -> tuple[Float[Array, " p"], Float[Array, " p"]]:
+        r"""Coordinates of $\theta + \dot\theta(y)\,\mathrm{step}$, and how much of `step` leads there.
+
+        Less than all of it where it would go further than nine tenths of the way to a bound. Close to one a coordinate
+        has to go far for the little that is left of its value, and a value goes far in a short step of it.
+        """
+        low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
+        rising, left = jnp.maximum(jax.nn.sigmoid(y), _TINY), jnp.maximum(jax.nn.sigmoid(-y), _TINY)
+        gap = _softplus(y)
+        between = jnp.clip(step, -_PART / left, _PART / rising)
+        above = jnp.maximum(step, -_PART * gap / rising)
+        further = gap + rising * above
+        both = y + jnp.log1p(left * between) - jnp.log1p(-rising * between)
+        one = further + jnp.log(-jnp.expm1(-further))
+        choose = lambda two, single, none: jnp.where(low & high, two, jnp.where(low | high, single, none))
+        return choose(both, one, y + step), choose(between, above, step)
 
 
 def _softplus(y: Array) -> Array:

@@ -4,7 +4,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.custom_batching import sequential_vmap
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Shaped
 
 # a direction with less of the curvature than this is rounding, and says nothing
 _FLAT = 1e-13
@@ -49,6 +49,12 @@ class Arrow(eqx.Module):
         after = jnp.einsum("rps,p->rs", self.mixed, shared) + jnp.einsum("rst,rt->rs", self.own, own)
         return jnp.concatenate([self.among @ shared + jnp.einsum("rps,rs->p", self.mixed, own), after.ravel()])
 
+    def without(self, held: Bool[Array, " d"]) -> "Arrow":
+        """Of the coordinates that are not `held`; those stand alone, with a curvature of one."""
+        shared, own = self._split(held)
+        mixed = jnp.where(shared[:, None] | own[:, None, :], 0.0, self.mixed)
+        return Arrow(alone(self.among, shared), mixed, jax.vmap(alone)(self.own, own))
+
     def solve(self, vector: Float[Array, " d"], damping: Array) -> Float[Array, " d"]:
         """What it, with `damping` on its diagonal, takes to `vector`."""
         left, right, through, own = self._eliminated(vector, damping)
@@ -64,7 +70,7 @@ class Arrow(eqx.Module):
         squares = jnp.where(told, (vectors.T @ right) ** 2 / jnp.where(told, values, 1.0), 0.0)
         return 0.5 * (jnp.sum(self._split(gradient)[1] * own) + jnp.sum(squares))
 
-    def _split(self, vector: Float[Array, " d"]) -> tuple[Float[Array, " p"], Float[Array, "r s"]]:
+    def _split(self, vector: Shaped[Array, " d"]) -> tuple[Shaped[Array, " p"], Shaped[Array, "r s"]]:
         p = len(self.among)
         return vector[:p], vector[p:].reshape(self.own.shape[:2])
 
@@ -95,6 +101,10 @@ class Spectrum(eqx.Module):
         """The product of |H| with a vector."""
         return self.vectors @ (jnp.abs(self.values) * (self.vectors.T @ vector))
 
+    def without(self, held: Bool[Array, " d"]) -> "Spectrum":
+        """Of the coordinates that are not `held`; those stand alone, with a curvature of one."""
+        return Spectrum(*eigh(alone((self.vectors * self.values) @ self.vectors.T, held)))
+
     def solve(self, vector: Float[Array, " d"], damping: Array) -> Float[Array, " d"]:
         """What |H|, with `damping` on its diagonal, takes to `vector`."""
         return self.vectors @ ((self.vectors.T @ vector) / (jnp.abs(self.values) + damping))
@@ -113,6 +123,11 @@ class Spectrum(eqx.Module):
     def negative(self) -> Bool[Array, ""]:
         """Whether it bends down somewhere."""
         return jnp.any(self.values < _NEGATIVE)
+
+
+def alone(matrix: Float[Array, "d d"], held: Bool[Array, " d"]) -> Float[Array, "d d"]:
+    """A matrix with ones on the diagonal, and zeros beside them, where coordinates are `held`."""
+    return jnp.where(held[:, None] | held, jnp.diag(held.astype(matrix.dtype)), matrix)
 
 
 @sequential_vmap

@@ -39,13 +39,17 @@ class Damped(optx.AbstractMinimiser):
     Ends where the full step promises a gain below `tolerance`: $\tfrac12 g^TH^{-1}g$ is half the squared distance to
     the optimum in standard errors, so 1e-5 stops within 0.005 of one, whatever the units. A trial that is not finite
     is refused, so only a start that does not run ends as `nonfinite`; where no step however short is better the search
-    ends as `nonlinear_divergence`.
+    ends as `nonlinear_divergence`. An entry that presses on a bound, with less to gain on the way there than
+    `tolerance`, stays where it is until it is pulled back; what a bound stops short of its step is held there, and the
+    others' steps are for that.
     """
 
     expand: Callable[[Any, Array], Expansion] = eqx.field(static=True)
     tolerance: float = eqx.field(static=True)
     # largest change of an entry in one step
     longest: float = eqx.field(static=True, default=float("inf"))
+    # where a step leads, and how much of it, if bounds may stop it; without them all of it, straight on
+    along: Callable[[Any, Array, Array], tuple[Array, Array]] | None = eqx.field(static=True, default=None)
     # what optimistix asks every solver for and this one has no use of
     rtol: ClassVar[float] = 0.0
     atol: ClassVar[float] = 0.0
@@ -63,18 +67,19 @@ class Damped(optx.AbstractMinimiser):
         new = self.expand(args, state.trial)
         gain = (state.at.cost - new.cost) / state.promised
         finite = jnp.all(jnp.stack([jnp.all(jnp.isfinite(part)) for part in jax.tree.leaves(new)]))
-        good = finite & (state.fresh | (gain > 0.0))
+        # what is stopped by bounds may promise nothing at all, and then is shortened
+        good = finite & (state.fresh | ((gain > 0.0) & (state.promised > 0.0)))
         chosen = lambda a, b: jnp.where(good, a, b)
         at = jax.tree.map(chosen, new, state.at)
         shrink = jnp.maximum(1.0 / 3.0, 1.0 - (2.0 * jnp.minimum(gain, 1.0) - 1.0) ** 3)
         factor = jnp.where(state.fresh, 1.0, chosen(shrink, state.growth))
         damping = jnp.maximum(_LEAST, state.damping * factor)
-        step, promised, decrement = _step(at, damping, self.longest)
         y = chosen(state.trial, y)
+        trial, promised, decrement = self._next(args, y, at, damping)
         # a start that does not run gives nothing to go by, and ends the search
         decrement = jnp.where(state.fresh & ~finite, jnp.nan, decrement)
         growth = chosen(2.0, 2.0 * state.growth)
-        return y, _State(jnp.asarray(False), at, y + step, promised, damping, growth, decrement), None
+        return y, _State(jnp.asarray(False), at, trial, promised, damping, growth, decrement), None
 
     def terminate(
         self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any
@@ -91,12 +96,24 @@ class Damped(optx.AbstractMinimiser):
         """The point itself."""
         return y, aux, {}
 
-
-def _step(at: Expansion, damping: Array, longest: float) -> tuple[Array, Array, Array]:
-    """The step, what its quadratic model promises to gain, and what the full step would."""
-    curvature, size = over_unit_diagonal(at.curvature)
-    gradient = at.gradient / size
-    move = -curvature.solve(gradient, damping)
-    move = move * jnp.minimum(1.0, longest / jnp.max(jnp.abs(move / size)))
-    promised = -jnp.sum(move * (gradient + 0.5 * curvature.times(move)))
-    return move / size, promised, curvature.gain(gradient)
+    def _next(self, args: Any, y: Array, at: Expansion, damping: Array) -> tuple[Array, Array, Array]:
+        """What to try next, what its quadratic model promises to gain, and what the full step would."""
+        curvature, size = over_unit_diagonal(at.curvature)
+        gradient, along = at.gradient / size, self.along
+        if along is not None:
+            room = jnp.abs(along(args, y, jnp.where(gradient > 0.0, -jnp.inf, jnp.inf))[1]) * size
+            pressed = (room * jnp.abs(gradient) < self.tolerance) & (room < jnp.sqrt(self.tolerance))
+            curvature, gradient = curvature.without(pressed), jnp.where(pressed, 0.0, gradient)
+        move = -curvature.solve(gradient, damping)
+        move = move * jnp.minimum(1.0, self.longest / jnp.max(jnp.abs(move / size)))
+        trial = y + move / size
+        if along is not None:
+            part = along(args, y, move / size)[1]
+            held = part != move / size
+            there = jnp.where(held, part * size, 0.0)
+            pull = jnp.where(held, 0.0, gradient + curvature.times(there))
+            move = there - curvature.without(held).solve(pull, damping)
+            trial, part = along(args, y, move / size)
+            move = part * size
+        promised = -jnp.sum(move * (gradient + 0.5 * curvature.times(move)))
+        return trial, promised, curvature.gain(gradient)

@@ -39,10 +39,11 @@ def _told(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array | No
     def one(part: tuple[Array, Array]) -> tuple[Array, Array, Array]:
         index, y = part
         at = of(index).expand(y)
-        covariance = inverse_information(at.hessian)
-        away = jnp.max(standard_errors_away(covariance, at.gradient)[:p], initial=0.0)
+        information = at.hessian
+        room = jnp.abs(problem.along(y, jnp.where(at.gradient > 0.0, -jnp.inf, jnp.inf))[1])
+        away = jnp.max(standard_errors_away(information, at.gradient, room)[:p], initial=0.0)
         theta, slope = jax.jvp(problem.transform.to_physical, (y[:p],), (jnp.ones(p),))
-        errors = jnp.abs(slope) * jnp.sqrt(jnp.diag(covariance)[:p])
+        errors = jnp.abs(slope) * jnp.sqrt(jnp.diag(inverse_information(information))[:p])
         return theta, errors, away
 
     return jax.lax.map(one, (jnp.arange(len(y)), y), batch_size=lanes_for(problem))

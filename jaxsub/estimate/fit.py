@@ -13,11 +13,14 @@ from ..recording.runs import Runs
 from ..results import RESULTS
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
+from .curvature import alone
 from .method import AbstractMethod
 from .methods import filtered_first, gauss_newton
 from .problem import Problem
 
 _CONCENTRATIONS = 12
+# standard errors from an optimum that is none
+_MATTERS = 0.1
 
 
 class Ended(eqx.Module):
@@ -65,7 +68,7 @@ class Fit(Ended):
     - `covariance`: of the p free parameters, physical units; the initial states' uncertainty is included.
     - `model`: the vehicle linearised along the fitted trajectory.
     - `gradient_norm`: largest |∂cost/∂y| in scaled coordinates, relative to the largest curvature's square root: how
-      many standard errors the optimum may still be away.
+      many standard errors the optimum within bounds may still be away.
     """
 
     covariance: Float[Array, "p p"]
@@ -211,8 +214,11 @@ def evaluate(ended: Ended) -> Fit:
 def _statistics(problem: Problem, model: Linearised) -> tuple[Array, Array]:
     """Covariance of the free parameters, and the gradient in standard errors."""
     information, gradient = information_matrix(problem, model)
-    covariance = inverse_information(information)
-    return covariance, jnp.max(standard_errors_away(covariance, gradient), initial=0.0)
+    rows, values = problem.vehicle.layout.free, problem.vehicle.values()
+    at = jnp.array([values[row.name] for row in rows])
+    lower, upper = (jnp.array([getattr(row, side) for row in rows]) for side in ("lower", "upper"))
+    away = standard_errors_away(information, gradient, jnp.where(gradient > 0.0, upper - at, at - lower))
+    return inverse_information(information), jnp.max(away, initial=0.0)
 
 
 def inverse_information(information: Float[Array, "p p"]) -> Float[Array, "p p"]:
@@ -224,16 +230,24 @@ def inverse_information(information: Float[Array, "p p"]) -> Float[Array, "p p"]
     return inverse / jnp.outer(size, size)
 
 
-def standard_errors_away(covariance: Float[Array, "p p"], gradient: Float[Array, " p"]) -> Float[Array, " p"]:
-    """How many standard errors a Newton step from here would move each parameter."""
-    return jnp.abs(covariance @ gradient) / jnp.sqrt(jnp.maximum(jnp.diag(covariance), 1e-300))
+def standard_errors_away(
+    information: Float[Array, "p p"], gradient: Float[Array, " p"], room: Float[Array, " p"]
+) -> Float[Array, " p"]:
+    """How many standard errors a Newton step from here would move each parameter, no further than bounds allow.
+
+    What presses on a bound, with less `room` downhill than matters, stays.
+    """
+    pressed = room * jnp.sqrt(jnp.diag(information)) < _MATTERS
+    covariance = inverse_information(alone(information, pressed))
+    step = jnp.abs(covariance @ jnp.where(pressed, 0.0, gradient))
+    return step / jnp.sqrt(jnp.maximum(jnp.diag(covariance), 1e-300))
 
 
 def judged(vehicle: AbstractVehicle, away: Float[Array, ""], result: RESULTS) -> RESULTS:
     """`result`, unless the inertia is not positive definite or the end is 0.1 standard errors off an optimum."""
     inertia = vehicle.mass_matrix()
     definite = jnp.all(jnp.linalg.eigvalsh(0.5 * (inertia + inertia.T)) > 0.0)
-    result = RESULTS.where((result == RESULTS.successful) & ~(away < 0.1), RESULTS.not_stationary, result)
+    result = RESULTS.where((result == RESULTS.successful) & ~(away < _MATTERS), RESULTS.not_stationary, result)
     return RESULTS.where(definite, result, RESULTS.indefinite_inertia)
 
 

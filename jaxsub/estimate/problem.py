@@ -128,6 +128,12 @@ class Problem(eqx.Module):
         """The coordinates of the physical parameters `theta` and the guessed initial states."""
         return self.coordinates().at[: len(theta)].set(self.transform.to_free(theta))
 
+    def along(self, y: Float[Array, " d"], step: Float[Array, " d"]) -> tuple[Float[Array, " d"], Float[Array, " d"]]:
+        """Where a `step` of the values leads from the coordinates `y`, and how much of it, as bounds allow."""
+        p = len(self.prior_mean)
+        theta, part = self.transform.stepped(y[:p], step[:p])
+        return jnp.concatenate([theta, y[p:] + step[p:]]), jnp.concatenate([part, step[p:]])
+
     def residuals(self, y: Float[Array, " d"]) -> Float[Array, " m"]:
         """Whitened errors of the outputs, then of the priors."""
         return jnp.concatenate([_outputs(self, y, jnp.zeros(len(self.spread))).ravel(), _prior(self, y)])

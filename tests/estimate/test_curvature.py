@@ -57,3 +57,24 @@ def test_parts_and_whole_take_the_same_steps():
     steps = lambda curvature: jax.vmap(lambda d: curvature.solve(VECTOR, d))(damping)
     np.testing.assert_allclose(steps(parts), steps(whole), rtol=1e-7)
     np.testing.assert_allclose(parts.gain(VECTOR), whole.gain(VECTOR), rtol=1e-9)
+
+
+def test_what_is_held_stands_alone():
+    """Claim: solves and gains without some coordinates are those of the matrix without their rows and columns."""
+    parts, _ = over_unit_diagonal(arrow())
+    held = np.zeros(P + R * S, bool)
+    held[[1, 3, P, P + 7]] = True
+    free = np.flatnonzero(~held)
+    vector = jnp.where(held, 0.0, VECTOR)
+    whole = np.asarray(parts.dense())[np.ix_(free, free)]
+    for curvature in (
+        parts.without(jnp.asarray(held)),
+        over_unit_diagonal(parts.dense())[0].without(jnp.asarray(held)),
+    ):
+        step = np.asarray(curvature.solve(vector, jnp.asarray(0.3)))
+        np.testing.assert_allclose(
+            step[free], np.linalg.solve(whole + 0.3 * np.eye(len(free)), VECTOR[free]), rtol=1e-9
+        )
+        np.testing.assert_allclose(step[held], 0.0, atol=1e-14)
+        expected = 0.5 * VECTOR[free] @ np.linalg.solve(whole, VECTOR[free])
+        np.testing.assert_allclose(curvature.gain(vector), expected, rtol=1e-8)
