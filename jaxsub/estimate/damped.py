@@ -48,8 +48,10 @@ class Damped(optx.AbstractMinimiser):
     tolerance: float = eqx.field(static=True)
     # largest change of an entry in one step
     longest: float = eqx.field(static=True, default=float("inf"))
-    # where a step leads, and how much of it, if bounds may stop it; without them all of it, straight on
-    along: Callable[[Any, Array, Array], tuple[Array, Array]] | None = eqx.field(static=True, default=None)
+    # of `args`: where from y a step leads, and how much of it, if there are bounds; else all of it, straight on
+    within: Callable[[Any], Callable[[Array, Array], tuple[Array, Array]] | None] = eqx.field(
+        static=True, default=lambda args: None
+    )
     # what optimistix asks every solver for and this one has no use of
     rtol: ClassVar[float] = 0.0
     atol: ClassVar[float] = 0.0
@@ -99,21 +101,21 @@ class Damped(optx.AbstractMinimiser):
     def _next(self, args: Any, y: Array, at: Expansion, damping: Array) -> tuple[Array, Array, Array]:
         """What to try next, what its quadratic model promises to gain, and what the full step would."""
         curvature, size = over_unit_diagonal(at.curvature)
-        gradient, along = at.gradient / size, self.along
+        gradient, along = at.gradient / size, self.within(args)
         if along is not None:
-            room = jnp.abs(along(args, y, jnp.where(gradient > 0.0, -jnp.inf, jnp.inf))[1]) * size
+            room = jnp.abs(along(y, jnp.where(gradient > 0.0, -jnp.inf, jnp.inf))[1]) * size
             pressed = (room * jnp.abs(gradient) < self.tolerance) & (room < jnp.sqrt(self.tolerance))
             curvature, gradient = curvature.without(pressed), jnp.where(pressed, 0.0, gradient)
         move = -curvature.solve(gradient, damping)
         move = move * jnp.minimum(1.0, self.longest / jnp.max(jnp.abs(move / size)))
         trial = y + move / size
         if along is not None:
-            part = along(args, y, move / size)[1]
+            part = along(y, move / size)[1]
             held = part != move / size
             there = jnp.where(held, part * size, 0.0)
             pull = jnp.where(held, 0.0, gradient + curvature.times(there))
             move = there - curvature.without(held).solve(pull, damping)
-            trial, part = along(args, y, move / size)
+            trial, part = along(y, move / size)
             move = part * size
         promised = -jnp.sum(move * (gradient + 0.5 * curvature.times(move)))
         return trial, promised, curvature.gain(gradient)

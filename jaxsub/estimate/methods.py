@@ -19,13 +19,13 @@ from .problem import Problem
 @functools.cache
 def gauss_newton(tolerance: float = 1e-5) -> Iterative:
     """Gauss–Newton with the damping of Levenberg and Marquardt."""
-    return Iterative(Damped(Problem.expand, tolerance, along=Problem.along), 60)
+    return Iterative(Damped(Problem.expand, tolerance, within=Problem.bounds), 60)
 
 
 @functools.cache
 def newton(tolerance: float = 1e-5) -> Iterative:
     """Damped Newton with the exact Hessian."""
-    return Iterative(Damped(Problem.expand_exactly, tolerance, along=Problem.along), 60)
+    return Iterative(Damped(Problem.expand_exactly, tolerance, within=Problem.bounds), 60)
 
 
 @functools.cache

@@ -128,6 +128,11 @@ class Problem(eqx.Module):
         """The coordinates of the physical parameters `theta` and the guessed initial states."""
         return self.coordinates().at[: len(theta)].set(self.transform.to_free(theta))
 
+    def bounds(self) -> Callable[[Array, Array], tuple[Array, Array]] | None:
+        """`along`, if any free number has a bound."""
+        rows = self.vehicle.layout.free
+        return self.along if any(math.isfinite(row.lower) or math.isfinite(row.upper) for row in rows) else None
+
     def along(self, y: Float[Array, " d"], step: Float[Array, " d"]) -> tuple[Float[Array, " d"], Float[Array, " d"]]:
         """Where a `step` of the values leads from the coordinates `y`, and how much of it, as bounds allow."""
         p = len(self.prior_mean)

@@ -57,7 +57,7 @@ def test_the_search_ends_where_scipys_bounded_one_does(seed, edge):
         J = jax.jacfwd(lambda y: curve(transform.to_physical(y), data) / 0.02)(y)
         return Expansion(cost(y), jax.grad(cost)(y), J.T @ J)
 
-    solver = Damped(expand, 1e-5, along=lambda args, y, step: transform.stepped(y, step))
+    solver = Damped(expand, 1e-5, within=lambda args: transform.stepped)
     begin = transform.to_free(jnp.asarray(START)) + jnp.asarray(edge * rng.choice([-1.0, 1.0], 4) * [0, 1, 1, 1])
     found = optx.minimise(lambda y, _: cost(y), solver, begin, max_steps=200, throw=False)
     bounds = [row.lower for row in ROWS], [row.upper for row in ROWS]
