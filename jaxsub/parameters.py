@@ -109,4 +109,6 @@ class Transform(eqx.Module):
 
 
 def _softplus(y: Array) -> Array:
-    return jnp.maximum(y, 0.0) + jnp.log1p(jnp.exp(-jnp.abs(y)))
+    # by |y| it would have no slope at zero
+    above, below = jnp.maximum(y, 0.0), jnp.minimum(y, 0.0)
+    return above + jnp.log1p(jnp.exp(below - above))
