@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-# of the way to a bound, the most that a step goes; and a slope so close to one that nothing is left to go
-_PART, _TINY = 0.9, 1e-300
+# of the way to a bound, the most that a step goes
+_PART = 0.9
 
 
 def number(value: ArrayLike) -> Array:
@@ -97,7 +97,8 @@ class Transform(eqx.Module):
         has to go far for the little that is left of its value, and a value goes far in a short step of it.
         """
         low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
-        rising, left = jnp.maximum(jax.nn.sigmoid(y), _TINY), jnp.maximum(jax.nn.sigmoid(-y), _TINY)
+        # so close to a bound that nothing is left to go there is no slope
+        rising, left = (jnp.maximum(jax.nn.sigmoid(side), jnp.finfo(y.dtype).tiny) for side in (y, -y))
         gap = _softplus(y)
         between = jnp.clip(step, -_PART / left, _PART / rising)
         above = jnp.maximum(step, -_PART * gap / rising)
