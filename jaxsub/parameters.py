@@ -87,7 +87,7 @@ class Transform(eqx.Module):
         fraction = jnp.clip((theta - lower) / width, 1e-3, 1.0 - 1e-3)
         gap = jnp.maximum(jnp.where(low, theta - lower, upper - theta) / self.scale, 1e-3)
         both = jnp.log(fraction) - jnp.log1p(-fraction)
-        one = gap + jnp.log(-jnp.expm1(-gap))
+        one = _of_softplus(gap)
         return jnp.where(low & high, both, jnp.where(low | high, one, (theta - self.centre) / self.scale))
 
     def stepped(self, y: Float[Array, " p"], step: Float[Array, " p"]) -> tuple[Float[Array, " p"], Float[Array, " p"]]:
@@ -102,9 +102,8 @@ class Transform(eqx.Module):
         gap = _softplus(y)
         between = jnp.clip(step, -_PART / left, _PART / rising)
         above = jnp.maximum(step, -_PART * gap / rising)
-        further = gap + rising * above
         both = y + jnp.log1p(left * between) - jnp.log1p(-rising * between)
-        one = further + jnp.log(-jnp.expm1(-further))
+        one = _of_softplus(gap + rising * above)
         choose = lambda two, single, none: jnp.where(low & high, two, jnp.where(low | high, single, none))
         return choose(both, one, y + step), choose(between, above, step)
 
@@ -113,3 +112,8 @@ def _softplus(y: Array) -> Array:
     # by |y| it would have no slope at zero
     above, below = jnp.maximum(y, 0.0), jnp.minimum(y, 0.0)
     return above + jnp.log1p(jnp.exp(below - above))
+
+
+def _of_softplus(value: Array) -> Array:
+    """What the softplus of is `value`."""
+    return value + jnp.log(-jnp.expm1(-value))

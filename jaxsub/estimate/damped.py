@@ -20,6 +20,9 @@ from .problem import Expansion
 
 _FIRST, _LEAST, _MOST = 1e-3, 1e-10, 1e12
 
+# from y, where a step leads as bounds allow, and how much of it
+Along = Callable[[Array, Array], tuple[Array, Array]]
+
 
 class _State(eqx.Module):
     """Where the search is, what it knows there, and what it tries next."""
@@ -49,9 +52,7 @@ class Damped(optx.AbstractMinimiser):
     # largest change of an entry in one step
     longest: float = eqx.field(static=True, default=float("inf"))
     # of `args`: where from y a step leads, and how much of it, if there are bounds; else all of it, straight on
-    within: Callable[[Any], Callable[[Array, Array], tuple[Array, Array]] | None] = eqx.field(
-        static=True, default=lambda args: None
-    )
+    within: Callable[[Any], Along | None] = eqx.field(static=True, default=lambda args: None)
     # what optimistix asks every solver for and this one has no use of
     rtol: ClassVar[float] = 0.0
     atol: ClassVar[float] = 0.0
@@ -103,7 +104,7 @@ class Damped(optx.AbstractMinimiser):
         curvature, size = over_unit_diagonal(at.curvature)
         gradient, along = at.gradient / size, self.within(args)
         if along is not None:
-            room = jnp.abs(along(y, jnp.where(gradient > 0.0, -jnp.inf, jnp.inf))[1]) * size
+            room = room_downhill(along, y, gradient) * size
             pressed = (room * jnp.abs(gradient) < self.tolerance) & (room < jnp.sqrt(self.tolerance))
             curvature, gradient = curvature.without(pressed), jnp.where(pressed, 0.0, gradient)
         move = -curvature.solve(gradient, damping)
@@ -119,3 +120,8 @@ class Damped(optx.AbstractMinimiser):
             move = part * size
         promised = -jnp.sum(move * (gradient + 0.5 * curvature.times(move)))
         return trial, promised, curvature.gain(gradient)
+
+
+def room_downhill(along: Along, y: Array, gradient: Array) -> Array:
+    """How far each entry may step against its gradient, as bounds allow."""
+    return jnp.abs(along(y, jnp.where(gradient > 0.0, -jnp.inf, jnp.inf))[1])

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..results import RESULTS
+from .damped import room_downhill
 from .fit import inverse_information, judged, standard_errors_away
 from .method import Found, in_shares, lanes_for, problems
 from .problem import Problem
@@ -40,7 +41,7 @@ def _told(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array | No
         index, y = part
         at = of(index).expand(y)
         information = at.hessian
-        room = jnp.abs(problem.along(y, jnp.where(at.gradient > 0.0, -jnp.inf, jnp.inf))[1])
+        room = room_downhill(problem.along, y, at.gradient)
         away = jnp.max(standard_errors_away(information, at.gradient, room)[:p], initial=0.0)
         theta, slope = jax.jvp(problem.transform.to_physical, (y[:p],), (jnp.ones(p),))
         errors = jnp.abs(slope) * jnp.sqrt(jnp.diag(inverse_information(information))[:p])

@@ -11,7 +11,6 @@ from jaxsub.estimate.damped import Damped
 from jaxsub.estimate.problem import Expansion
 from jaxsub.parameters import Parameter, Transform
 
-INF = np.inf
 ROWS = [
     Parameter("free"),
     Parameter("above", lower=0.5),
