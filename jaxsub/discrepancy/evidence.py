@@ -65,24 +65,17 @@ class Products:
     parts: np.ndarray
 
     def predicted(self, chosen: Sequence[int]) -> np.ndarray:
-        """(m,) log likelihood of each part of the recordings, all numbers those that the others ask for."""
-        index, found = self._index(chosen), -self.spreads
-        for k, part in enumerate(self.parts):
-            w = np.linalg.solve(self._block(self.gram - part, chosen), (self.gram - part)[index, 0])
-            found[k] -= 0.5 * float(part[0, 0] - 2.0 * w @ part[index, 0] + w @ part[np.ix_(index, index)] @ w)
-        return found
+        """(m,) log probability of each part of the recordings by the others, which leave every number some room.
 
-    def elsewhere(self, columns: Sequence[int]) -> np.ndarray:
-        """(m,) the least share of the squares of some candidate columns that is in other parts than each."""
-        at = self.known + np.array(columns)
-        return np.min(1.0 - self.parts[:, at, at] / np.maximum(self.gram[at, at], 1e-300), axis=1)
+        At the numbers that the others like best, what they hardly tell would count as a wrong prediction.
+        """
+        whole = self._integrated(self.gram, chosen)
+        return np.array([whole - self._integrated(self.gram - part, chosen) for part in self.parts]) - self.spreads
 
     def log_evidence(self, chosen: Sequence[int]) -> float:
         """Of the recordings with the candidate columns `chosen` in the model."""
-        factor = np.linalg.cholesky(self._block(self.gram, chosen))
-        half = np.linalg.solve(factor, self.gram[self._index(chosen), 0])
-        occam = float(np.sum(np.log(np.diag(factor)))) + 0.5 * len(chosen) * np.log(self.samples)
-        return 0.5 * (half @ half - self.gram[0, 0]) - float(np.sum(self.spreads)) - occam
+        priors = 0.5 * len(chosen) * np.log(self.samples)
+        return self._integrated(self.gram, chosen) - float(np.sum(self.spreads)) - priors
 
     def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> Gains:
         """What each further candidate would add to `chosen`."""
@@ -154,6 +147,12 @@ class Products:
         index = self._index(chosen)
         worth = np.repeat([0.0, 1.0 / self.samples], [self.known - 1, len(chosen)])
         return gram[np.ix_(index, index)] + np.diag(worth)
+
+    def _integrated(self, gram: np.ndarray, chosen: Sequence[int]) -> float:
+        r"""$\ln\int e^{-\frac12 r^T r}$ over the free parameters and amplitudes, but for $2\pi$: by products `gram`."""
+        block, with_residual = self._block(gram, chosen), gram[self._index(chosen), 0]
+        squares = gram[0, 0] - with_residual @ np.linalg.solve(block, with_residual)
+        return -0.5 * float(squares + np.linalg.slogdet(block)[1])
 
     def _left(self, chosen: Sequence[int], more: Sequence[int] | None = None) -> np.ndarray:
         """(1 + q, 1 + q) products of the residual and candidates, less what `chosen` and parameters take up.

@@ -28,8 +28,6 @@ _LARGE = 4.0
 # times the errors that a candidate leaves and explains: what may stand in its place leaves no more, explains no less
 _NO_MORE, _NO_LESS = 2.0, 0.5
 _STILL = 1e-6
-# of the squares of an effect, the share that other parts of the recordings hold where they can foretell one
-_FORETOLD = 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -204,15 +202,11 @@ class Selector:
         return (1.0 - share <= _NO_MORE * (1.0 - share[index])) & (share >= _NO_LESS * share[index])
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
-        """Whether `more` helps to predict parts of the recordings, or of a free run that asked, from the others.
-
-        A part is not asked where all others together tell too little of it: a stop that a rudder meets in one part.
-        """
+        """Whether `more` helps to predict parts of the recordings, or of a free run that asked, from the others."""
         before, after = self.columns(chosen), self.columns([*chosen, more])
         free = more in self.freely
         without, with_it = (self.free if free else self.evidence.best(columns)[1] for columns in (before, after))
-        asked = with_it.elsewhere(self.owners[more]) > _FORETOLD
-        return bool(np.sum((with_it.predicted(after) - without.predicted(before))[asked]) > 0.0)
+        return bool(np.sum(with_it.predicted(after)) > np.sum(without.predicted(before)))
 
     def p_value(self, index: int, scan: Scan) -> float:
         """Of a candidate's χ², corrected for all that were tried."""

@@ -58,6 +58,21 @@ def log_evidence(W, prior, chosen):
     return whole - constant - 0.7
 
 
+@pytest.mark.parametrize("chosen", [[], [0, 3]])
+def test_a_part_is_predicted_by_all_that_the_others_leave_open(dense, chosen):
+    """Claim: it is the density of the part given the others, of the dense covariance of all."""
+    W, prior, whole = dense
+    rows = np.split(np.arange(40), 4)
+    parts = np.stack([W[at].T @ W[at] for at in rows])
+    split = dataclasses.replace(whole, parts=parts, spreads=np.array([0.1, 0.2, 0.3, 0.1]))
+    J, S = W[:, 1:4], W[:, [4 + c for c in chosen]]
+    covariance = np.eye(40) + J @ np.diag(1.0 / np.diag(prior)[1:]) @ J.T + 40.0 * S @ S.T
+    density = lambda at: stats.multivariate_normal(np.zeros(len(at)), covariance[np.ix_(at, at)]).logpdf(W[at, 0])
+    for at, spread, predicted in zip(rows, split.spreads, split.predicted(chosen), strict=True):
+        given = density(np.arange(40)) - density(np.setdiff1d(np.arange(40), at))
+        np.testing.assert_allclose(predicted, given + 5.0 * np.log(2.0 * np.pi) - spread, rtol=1e-10)
+
+
 @pytest.mark.parametrize("chosen", [[], [1], [0, 3], [1, 2, 4]])
 def test_it_is_the_integral_over_all_amplitudes(dense, chosen):
     W, prior, products = dense
