@@ -4,7 +4,6 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,38 +11,12 @@ import numpy as np
 from jaxsub.estimate import Problem
 
 from .case import Case, problem_and_case
+from .ours import cost, expansion, forward_jacobian, points, with_gradient
 from .peers import casadi_model
 from .peers.peak import peak_flops
 from .timing import in_turn, once, pin
 
 _CORES = 2
-
-
-@eqx.filter_jit
-def cost(problem: Problem, z: jax.Array) -> jax.Array:
-    """The cost at one point (d,) or at several (N, d)."""
-    return problem.cost(z) if z.ndim == 1 else jax.vmap(problem.cost)(z)
-
-
-@eqx.filter_jit
-def with_gradient(problem: Problem, z: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """The cost and its gradient, by reverse mode."""
-    of = jax.value_and_grad(problem.cost)
-    return of(z) if z.ndim == 1 else jax.vmap(of)(z)
-
-
-@eqx.filter_jit
-def forward_jacobian(problem: Problem, z: jax.Array) -> jax.Array:
-    """Whitened errors by the coefficients alone, columns first."""
-    p = len(problem.prior_mean)
-    tangents = jnp.eye(p, z.shape[0])
-    return jax.vmap(lambda tangent: jax.jvp(problem.residuals, (z,), (tangent,))[1])(tangents)
-
-
-@eqx.filter_jit
-def expansion(problem: Problem, z: jax.Array):
-    """All that a Gauss-Newton step takes: cost, gradient and curvature by coefficients and initial states."""
-    return problem.expand(z) if z.ndim == 1 else jax.vmap(problem.expand)(z)
 
 
 def single(out: Path, quick: bool) -> dict:
@@ -136,11 +109,6 @@ def batched(out: Path, quick: bool) -> dict:
             found[f"{name}_over_CasADi_C"] = a_member["jaxsub, two threads"]["s"] / peer
             found[f"{name}_in_C_over_CasADi_C"] = a_member["jaxsub in C, two threads"]["s"] / peer
     return found
-
-
-def points(case: Case, count: int) -> np.ndarray:
-    """(N, d) coordinates about the start of the search."""
-    return 0.01 * np.random.default_rng(1).standard_normal((count, case.size))
 
 
 def agreement(problem: Problem, case: Case, z: np.ndarray) -> dict[str, float]:

@@ -5,7 +5,7 @@ from .disturbance import estimate_disturbance
 from .ends import Ends, ends
 from .filtered import Filtered
 from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
-from .method import AbstractMethod, Found, Iterative, share_for
+from .method import AbstractMethod, Found, Iterative, share_for, shares_at_once
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .posterior import posterior
 from .problem import Expansion, Problem, initial_guess
@@ -49,5 +49,6 @@ __all__ = [
     "scattered_by_number",
     "search",
     "share_for",
+    "shares_at_once",
     "success",
 ]

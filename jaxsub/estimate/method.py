@@ -20,7 +20,11 @@ from .pool import pool
 from .problem import Problem
 
 # a search's working set is this many copies of its whitened Jacobian; lanes share what memory there is
-_COPIES, _MEMORY, _LANES = 6, 1.0e9, 8
+_COPIES = 6
+# bytes and lanes of a pool on a core; and on an accelerator, which has one pool and this part of its memory. There a
+# step of 256 searches takes little longer than one of 16 (2.5 times on an H200), and wider pools wait for their slowest
+_MEMORY, _LANES = 1.0e9, 8
+_PART_OF_ACCELERATOR, _LANES_OF_ACCELERATOR = 0.5, 256
 # searches that a lane takes one after the other: enough that little time goes by with lanes idle at the end of a share
 _TURNS = 16
 
@@ -78,10 +82,11 @@ Program = Callable[[Any, Problem, Array, Array | None], T]
 
 
 def in_shares(program: Program[T], method: Any, problem: Problem, starts: Array, outputs: Array | None) -> T:
-    """`program(method, problem, starts, outputs)` in shares of one size, over all local devices or, if one, all cores.
+    """`program(method, problem, starts, outputs)` in shares of one size, over all devices or a CPU's cores.
 
     Where a share begins depends on neither, so the same start meets the same program with the same neighbours and ends
-    at the same number to the last digit wherever it runs. The last share is filled up with starts that end at once.
+    at the same number to the last digit on CPUs of any number. The last share is filled up with starts that end at
+    once.
     """
     count, size = len(starts), share_for(problem)
     if count <= size:
@@ -99,10 +104,10 @@ def in_shares(program: Program[T], method: Any, problem: Problem, starts: Array,
 
 
 def _over_cores(program: Any, method: Any, problem: Problem, rounds: Sequence[tuple[Array, Any]]) -> list:
-    """A thread for each core. Compiled before they begin: threads that trace the same program at once can crash JAX."""
+    """A thread for each share. Compiled before: threads that trace the same program at once can crash JAX."""
     compiled = program.lower(method, problem, *rounds[0]).compile()
     own = lambda part: jax.block_until_ready(compiled(method, problem, *part))
-    with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
+    with ThreadPoolExecutor(shares_at_once()) as threads:
         return list(threads.map(own, rounds))
 
 
@@ -149,7 +154,8 @@ def costs(of: Callable[[Any], Problem], y: Float[Array, "n d"], lanes: int) -> F
 
 def lanes_for(problem: Problem) -> int:
     """How many searches may share the memory at once."""
-    return int(max(1, min(_LANES, _MEMORY / bytes_of_a_lane(problem))))
+    memory, lanes = _room()
+    return int(max(1, min(lanes, memory / bytes_of_a_lane(problem))))
 
 
 def bytes_of_a_lane(problem: Problem) -> int:
@@ -160,4 +166,16 @@ def bytes_of_a_lane(problem: Problem) -> int:
 
 def share_for(problem: Problem) -> int:
     """How many starts go through one pool, each with a recording of its own, which the memory has to hold too."""
-    return int(max(1, min(_TURNS * lanes_for(problem), _MEMORY / (8 * problem.runs.outputs.size))))
+    return int(max(1, min(_TURNS * lanes_for(problem), _room()[0] / (8 * problem.runs.outputs.size))))
+
+
+def shares_at_once() -> int:
+    """How many shares are worked on side by side: one on each device, and on a single CPU one on each core."""
+    devices = jax.local_device_count()
+    return os.cpu_count() or 1 if devices == 1 and jax.default_backend() == "cpu" else devices
+
+
+def _room() -> tuple[float, int]:
+    """Bytes and lanes that a pool may have, on the device that JAX picks."""
+    told = None if jax.default_backend() == "cpu" else jax.local_devices()[0].memory_stats()
+    return (_PART_OF_ACCELERATOR * told["bytes_limit"], _LANES_OF_ACCELERATOR) if told else (_MEMORY, _LANES)

@@ -27,8 +27,10 @@ def foreign(source: str, names: Sequence[str]) -> dict[str, str]:
 
     The library is kept in the folder of JAX's compilation cache, where the caller has set one.
 
-    **Raises** `InputError` where there is no C compiler, `$CC` or `cc`, or it fails.
+    **Raises** `InputError` where there is no C compiler, `$CC` or `cc`, or it fails, and where JAX is not on a CPU.
     """
+    if jax.default_backend() != "cpu":
+        raise InputError("C", f"runs on a CPU, and JAX has picked {jax.default_backend()}", "set JAX_PLATFORMS=cpu")
     key = _key(source)
     _register(source, key, tuple(names))
     return {name: f"jaxsub_{name}_{key}" for name in names}
