@@ -12,7 +12,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Bool, Float
 
 # of the way to a bound, the most that a step goes
 _PART = 0.9
@@ -72,23 +72,20 @@ class Transform(eqx.Module):
 
     def to_physical(self, y: Float[Array, " p"]) -> Float[Array, " p"]:
         """Physical values of the coordinates `y`."""
-        low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
+        low, lower, upper = self._bounds()
         soft = self.scale * _softplus(y)
-        lower, upper = jnp.where(low, self.lower, 0.0), jnp.where(high, self.upper, 0.0)
         both = lower + (upper - lower) / (1.0 + jnp.exp(-y))
         one = jnp.where(low, lower + soft, upper - soft)
-        return jnp.where(low & high, both, jnp.where(low | high, one, self.centre + self.scale * y))
+        return self._as_bounded(both, one, self.centre + self.scale * y)
 
     def to_free(self, theta: Float[Array, " p"]) -> Float[Array, " p"]:
         """Coordinates of the physical values `theta`, which are first moved just inside their bounds."""
-        low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
-        lower, upper = jnp.where(low, self.lower, 0.0), jnp.where(high, self.upper, 0.0)
-        width = jnp.where(low & high, upper - lower, 1.0)
+        low, lower, upper = self._bounds()
+        width = self._as_bounded(upper - lower, 1.0, 1.0)
         fraction = jnp.clip((theta - lower) / width, 1e-3, 1.0 - 1e-3)
         gap = jnp.maximum(jnp.where(low, theta - lower, upper - theta) / self.scale, 1e-3)
         both = jnp.log(fraction) - jnp.log1p(-fraction)
-        one = _of_softplus(gap)
-        return jnp.where(low & high, both, jnp.where(low | high, one, (theta - self.centre) / self.scale))
+        return self._as_bounded(both, _of_softplus(gap), (theta - self.centre) / self.scale)
 
     def stepped(self, y: Float[Array, " p"], step: Float[Array, " p"]) -> tuple[Float[Array, " p"], Float[Array, " p"]]:
         r"""Coordinates of $\theta + \dot\theta(y)\,\mathrm{step}$, and how much of `step` leads there.
@@ -96,7 +93,6 @@ class Transform(eqx.Module):
         Less than all of it where it would go further than nine tenths of the way to a bound. Close to one a coordinate
         has to go far for the little that is left of its value, and a value goes far in a short step of it.
         """
-        low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
         # so close to a bound that nothing is left to go there is no slope
         rising, left = (jnp.maximum(jax.nn.sigmoid(side), jnp.finfo(y.dtype).tiny) for side in (y, -y))
         gap = _softplus(y)
@@ -104,8 +100,17 @@ class Transform(eqx.Module):
         above = jnp.maximum(step, -_PART * gap / rising)
         both = y + jnp.log1p(left * between) - jnp.log1p(-rising * between)
         one = _of_softplus(gap + rising * above)
-        choose = lambda two, single, none: jnp.where(low & high, two, jnp.where(low | high, single, none))
-        return choose(both, one, y + step), choose(between, above, step)
+        return self._as_bounded(both, one, y + step), self._as_bounded(between, above, step)
+
+    def _bounds(self) -> tuple[Bool[Array, " p"], Float[Array, " p"], Float[Array, " p"]]:
+        """Which have a lower bound, and the bounds, 0 where there is none."""
+        low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
+        return low, jnp.where(low, self.lower, 0.0), jnp.where(high, self.upper, 0.0)
+
+    def _as_bounded(self, both: ArrayLike, one: ArrayLike, none: ArrayLike) -> Float[Array, " p"]:
+        """What goes for those with two bounds, with one and with none."""
+        low, high = jnp.isfinite(self.lower), jnp.isfinite(self.upper)
+        return jnp.where(low & high, both, jnp.where(low | high, one, none))
 
 
 def _softplus(y: Array) -> Array:
