@@ -58,16 +58,31 @@ def test_what_one_part_alone_shows_is_not_refused_by_the_others(column, helps):
     rng = np.random.default_rng(5)
     shown = rng.standard_normal(200) * np.where(np.repeat(range(4), 50) == 3, 1.0, 1.0 - column)
     sizes = np.repeat([2.0, -2.0, 2.0, -2.0], 50)
-    W = np.column_stack([0.1 * rng.standard_normal(200) + sizes * shown, rng.standard_normal(200), shown])
-    parts = np.stack([w.T @ w for w in np.split(W, 4)])
+    columns = [0.1 * rng.standard_normal(200) + sizes * shown, rng.standard_normal(200), shown]
+    assert in_four_parts(columns).predicts([], 0) == helps
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_others_hardly_tell_of_a_coefficient_is_not_held_against_an_effect(seed):
+    """Claim: a coefficient that moves in one part, and hardly in the others, does not hide an effect that all show."""
+    rng = np.random.default_rng(seed)
+    shown, moved = rng.standard_normal(200), rng.standard_normal(200) * np.repeat([0.03, 0.03, 0.03, 1.0], 50)
+    assert in_four_parts([rng.standard_normal(200) + 0.4 * shown, moved, shown]).predicts([], 0)
+
+
+def in_four_parts(columns):
+    """A selector of one effect, by whitened columns: a residual, a coefficient's and the effect's.
+
+    Where the effect is left out a disturbance stands for it, of a variance that is 1.5 of the noise's.
+    """
+    parts = np.stack([w.T @ w for w in np.split(np.column_stack(columns), 4)])
     still = Disturbance(*jnp.ones((3, 1)))
-    # where the effect is left out a disturbance stands for it, of a variance that is 1.5 of the noise's
     wide = Products(still, parts.sum(axis=0) / 1.5, np.full(4, 25.0 * np.log(1.5)), 200, 2, parts / 1.5)
     bare = Products(still, parts.sum(axis=0), np.zeros(4), 200, 2, parts)
     asked = object.__new__(Selector)
     asked.owners, asked.freely = [[0]], set()
     asked.evidence = SimpleNamespace(best=lambda columns: (0.0, bare if columns else wide))
-    assert asked.predicts([], 0) == helps
+    return asked
 
 
 def test_what_rules_a_free_run_need_not_be_what_was_chosen_sample_by_sample():
