@@ -14,7 +14,7 @@ from .case import Case, problem_and_case
 from .ours import cost, expansion, forward_jacobian, points, with_gradient
 from .peers import casadi_model
 from .peers.peak import peak_flops
-from .timing import in_turn, once, pin
+from .timing import a_member, in_turn, once, pin
 
 _CORES = 2
 
@@ -103,11 +103,11 @@ def batched(out: Path, quick: bool) -> dict:
                 },
                 2 if quick else 7,
             )
-            a_member = {key: {k: v / count for k, v in row.items() if k != "first_s"} for key, row in rows.items()}
-            peer = a_member["CasADi C, two threads"]["s"]
-            found["seconds_a_member"][name] = a_member
-            found[f"{name}_over_CasADi_C"] = a_member["jaxsub, two threads"]["s"] / peer
-            found[f"{name}_in_C_over_CasADi_C"] = a_member["jaxsub in C, two threads"]["s"] / peer
+            each = {key: a_member(row, count) for key, row in rows.items()}
+            peer = each["CasADi C, two threads"]["s"]
+            found["seconds_a_member"][name] = each
+            found[f"{name}_over_CasADi_C"] = each["jaxsub, two threads"]["s"] / peer
+            found[f"{name}_in_C_over_CasADi_C"] = each["jaxsub in C, two threads"]["s"] / peer
     return found
 
 

@@ -9,23 +9,21 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingImports]
 
 from jaxsub.cli import session
-from jaxsub.estimate import Problem, gauss_newton, scattered
+from jaxsub.estimate import Problem
 
 from .case import Case, problem_and_case
+from .ours import COUNT, SPREAD, ended, starts_of, swept
 from .peers.casadi_fit import SingleShooting
 from .peers.casadi_model import Model
 from .peers.damped import End
 from .timing import once, pin
 
-COUNT, SPREAD, SEED = 1000, 0.5, 5
 # s that one side may take; where it would take longer it does as many starts as fit, and the table says how many
 _LIMIT, _TRIAL = 90.0, 32
-_MARGIN = 0.1
 _peer: list[SingleShooting] = []
 
 
@@ -33,7 +31,7 @@ def run(out: Path, quick: bool) -> dict:
     """Seconds a start, and how many starts end at the least cost known, of both."""
     pin(2)
     problem, case = problem_and_case()
-    starts = np.asarray(scattered(problem, SPREAD, COUNT, SEED))
+    starts = starts_of(problem, COUNT)
     rows = {}
     for name, make in {"jaxsub": lambda: problem, "jaxsub in C": problem.in_c}.items():
         session.console.print(f"many_starts: {name} …", highlight=False)
@@ -42,11 +40,7 @@ def run(out: Path, quick: bool) -> dict:
     session.console.print("many_starts: CasADi …", highlight=False)
     rows["CasADi C, two processes"] = _two_processes(case, starts[: 4 if quick else COUNT])
     best = min(np.nanmin(row["cost"]) for row in rows.values())
-    for row in rows.values():
-        cost = row.pop("cost")
-        row["seconds_a_start"] = row["seconds"] / row["starts"]
-        row["reached"] = float(np.mean(cost < best + _MARGIN))
-        row["lost"] = int(np.sum(~np.isfinite(cost)))
+    rows = {name: ended(row, best) for name, row in rows.items()}
     return {
         "cores": 2,
         "spread": SPREAD,
@@ -60,24 +54,10 @@ def run(out: Path, quick: bool) -> dict:
 
 def _ours(problem: Problem, starts: np.ndarray, made_s: float, quick: bool) -> dict:
     """A sweep of as many starts as there is time for, told from a few; made and compiled apart."""
-    sweep = lambda chosen: gauss_newton().run(problem, jnp.asarray(chosen))
-    some = starts[: 4 if quick else _TRIAL]
-    (found, first), count = once(lambda: sweep(some)), len(some)
-    found, seconds = once(lambda: sweep(some))
-    compiling = first - seconds
+    row = swept(problem, starts[: 4 if quick else _TRIAL])
     if not quick:
-        count = 2 * int(min(COUNT, _LIMIT / (seconds / _TRIAL)) / 2)
-        # a program is for a number of starts: it is compiled on as many that are at the end already
-        end = np.asarray(found.y)[np.nanargmin(np.asarray(found.cost))]
-        compiling = once(lambda: sweep(np.tile(end, (count, 1))))[1]
-        found, seconds = once(lambda: sweep(starts[:count]))
-    return {
-        "starts": count,
-        "compile_s": made_s + compiling,
-        "seconds": seconds,
-        "cost": np.asarray(found.cost),
-        "evaluations_median": float(np.median(np.asarray(found.evaluations))),
-    }
+        row = swept(problem, starts[: 2 * int(min(COUNT, _LIMIT / (row["seconds"] / _TRIAL)) / 2)])
+    return row | {"compile_s": made_s + row["compile_s"]}
 
 
 def _two_processes(case: Case, starts: np.ndarray) -> dict:

@@ -40,6 +40,11 @@ def once(call: Callable[[], Any]) -> tuple[Any, float]:
     return found, time.perf_counter() - begin
 
 
+def a_member(row: dict[str, float], count: int) -> dict[str, float]:
+    """A batch's seconds, but for those of its first call, as those of each of its `count` members."""
+    return {name: seconds / count for name, seconds in row.items() if name != "first_s"}
+
+
 def slope(sizes: list[int], values: list[float]) -> float:
     """Of log `values` over log `sizes`, by least squares."""
     return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])

@@ -85,8 +85,7 @@ def in_shares(program: Program[T], method: Any, problem: Problem, starts: Array,
     """`program(method, problem, starts, outputs)` in shares of one size, over all devices or a CPU's cores.
 
     Where a share begins depends on neither, so the same start meets the same program with the same neighbours and ends
-    at the same number to the last digit on CPUs of any number. The last share is filled up with starts that end at
-    once.
+    at the same number to the last digit on any number of CPUs. The last share is filled with starts that end at once.
     """
     count, size = len(starts), share_for(problem)
     if count <= size:
