@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from jaxsub.cli import session
+from jaxsub.cli import session, terminal
 
 Part = Callable[[str, Path, bool], dict]
 
@@ -40,13 +40,13 @@ def main(
         return
     for name in names:
         if (folder / f"{name}.json").exists():
-            session.console.print(f"{name}: already in {folder}", highlight=False)
+            terminal.note(f"{name}: already in {folder}")
             continue
-        session.console.print(f"{name} …", highlight=False)
+        terminal.note(f"{name} …")
         command = [sys.executable, "-m", package, "--out", str(chosen.out), "--part", name]
         subprocess.run([*command, *(["--quick"] if chosen.quick else [])], check=True)
     written = {name: folder / f"{name}.json" for name in names}
     # a part whose recordings are not here says so and ends without a result
     found = {name: json.loads(path.read_text(encoding="utf-8")) for name, path in written.items() if path.exists()}
     (chosen.out / "results.json").write_text(json.dumps(assembled(found), indent=1), encoding="utf-8")
-    session.console.print(f"results: {chosen.out / 'results.json'}", highlight=False)
+    terminal.say(f"results: {chosen.out / 'results.json'}")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jaxsub.cli import session
+from jaxsub.cli import session, terminal
 from jaxsub.discrepancy import diagnose
 from jaxsub.recording import Recording, load, save
 from jaxsub.vehicle import read_vehicle, write_vehicle
@@ -38,7 +38,7 @@ def main() -> None:
         folder = chosen.out / f"flight{number + 1}"
         write(folder, number)
         lines.append(judged(folder))
-        session.console.print(said(lines[-1]), highlight=False, markup=False, soft_wrap=True)
+        terminal.note(said(lines[-1]))
         (chosen.out / "results.json").write_text(json.dumps(lines, indent=1), encoding="utf-8")
     draw(lines, chosen.out / "autopilot.png")
 
@@ -61,7 +61,7 @@ def judged(folder: Path) -> dict:
     """What a diagnosis says of the files, the last run held out, beside what is true."""
     runs = [load(path) for path in sorted(folder.glob("run*.csv"))]
     begin = time.perf_counter()
-    told = lambda message: session.console.print(message, highlight=False, markup=False)
+    told = lambda message: terminal.note(message)
     found, _ = diagnose(read_vehicle(folder / "vehicle.toml"), runs[:-1], runs[-1:], progress=told)
     seconds = time.perf_counter() - begin
     numbers = {}

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.cli import session
+from jaxsub.cli import terminal
 from jaxsub.estimate import Problem
 from jaxsub.estimate.method import lanes_for
 
@@ -37,7 +37,7 @@ def run(out: Path, quick: bool) -> dict:
             z = jnp.asarray(points(case, count))
             row = timed(lambda of=of, z=z: of(problem, z), 3)
             rows[count] = {"first_s": row["first_s"], **a_member(row, count)}
-            session.console.print(f"accelerator: {of.__name__} {count}: {rows[count]['s']:.2e} s", highlight=False)
+            terminal.note(f"accelerator: {of.__name__} {count}: {rows[count]['s']:.2e} s")
         found["seconds_a_member"][of.__name__] = rows
         whole = [count * row["s"] for count, row in rows.items()]
         found[f"slope_of_time: {of.__name__}"] = slope(list(rows), whole)

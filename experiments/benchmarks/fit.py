@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.cli import session
+from jaxsub.cli import terminal
 from jaxsub.estimate import Problem, gauss_newton
 
 from .case import Case, problem_and_case
@@ -37,7 +37,7 @@ def run(out: Path, quick: bool) -> dict:
     found: dict[str, dict] = {}
 
     def measure(name: str, prepare: Callable[[], tuple[Callable[[], End], dict]], times: int = repeats) -> None:
-        session.console.print(f"fit: {name} …", highlight=False)
+        terminal.note(f"fit: {name} …")
         try:
             fit, before = prepare()
             first = once(fit)[1]

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingImports]
 
-from jaxsub.cli import session
+from jaxsub.cli import terminal
 from jaxsub.estimate import Problem
 
 from .case import Case, problem_and_case
@@ -34,10 +34,10 @@ def run(out: Path, quick: bool) -> dict:
     starts = starts_of(problem, COUNT)
     rows = {}
     for name, make in {"jaxsub": lambda: problem, "jaxsub in C": problem.in_c}.items():
-        session.console.print(f"many_starts: {name} …", highlight=False)
+        terminal.note(f"many_starts: {name} …")
         of, made_s = once(make)
         rows[name] = _ours(of, starts, made_s, quick)
-    session.console.print("many_starts: CasADi …", highlight=False)
+    terminal.note("many_starts: CasADi …")
     rows["CasADi C, two processes"] = _two_processes(case, starts[: 4 if quick else COUNT])
     best = min(np.nanmin(row["cost"]) for row in rows.values())
     rows = {name: ended(row, best) for name, row in rows.items()}

@@ -14,7 +14,7 @@ import threading
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
-from jaxsub.cli import session
+from jaxsub.cli import terminal
 
 from .assemble import assemble, is_right
 from .figures import draw
@@ -44,7 +44,7 @@ def main() -> None:
     results = assemble(read(path))
     (chosen.out / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
     draw(results, chosen.out / "figures")
-    session.console.print(f"results: {chosen.out / 'results.json'}", highlight=False)
+    terminal.note(f"results: {chosen.out / 'results.json'}")
 
 
 def run(todo: list[Case], path: Path, jobs: int) -> None:
@@ -60,7 +60,7 @@ def run(todo: list[Case], path: Path, jobs: int) -> None:
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(line) + "\n")
             told = f"{next(number)}/{len(todo)} {said(line)}"
-            session.console.print(told, highlight=False, markup=False, soft_wrap=True)
+            terminal.note(told)
 
     def keep_going(core: int) -> None:
         spawn, own = multiprocessing.get_context("spawn"), (core,) if jobs > 1 else ()

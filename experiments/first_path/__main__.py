@@ -16,9 +16,10 @@ from pathlib import Path
 
 from scipy import stats
 
-from jaxsub.cli import session
+from jaxsub.cli import session, terminal
 from jaxsub.cli.demo import make_files
 from jaxsub.effects import AbstractEffect
+from jaxsub.plain import to_json
 
 from .outside import OUTSIDE
 
@@ -62,7 +63,7 @@ def case(seed: int, *concealed: AbstractEffect | None, again: bool = False) -> d
             improved = folder / "out" / "improved.toml"
             line["again"] = judge(folder, str(improved.relative_to(folder)), "again")["verdict"]
     said = f"{line['concealed']}: {line['verdict']} {names} {line['seconds']:.0f} s"
-    session.console.print(said, highlight=False, markup=False)
+    terminal.say(said)
     return line
 
 
@@ -95,7 +96,7 @@ def main() -> None:
     }
     chosen.out.mkdir(parents=True, exist_ok=True)
     (chosen.out / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
-    session.console.print_json(data={k: v for k, v in results.items() if k != "cases"})
+    terminal.say(to_json({k: v for k, v in results.items() if k != "cases"}))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.cli import session
+from jaxsub.cli import session, terminal
 from jaxsub.discrepancy import batch
 from jaxsub.effects import VOCABULARY, AbstractEffect, amplitudes, candidates, numbers, with_numbers
 from jaxsub.estimate import predict
@@ -89,7 +89,7 @@ def pictures(out: Path, quick: bool, known: Mapping[str, dict]) -> Iterator[dict
         if not np.all(np.isfinite(changed)) or np.allclose(changed, on.plain[:, channel]):
             raise RuntimeError(f"{effect.label} diverges, or does not show in {scene.channel}")
         draw(out / f"{scene.name}.png", scene.channel, on.drive, on.vehicle, on.plain[:, channel], changed)
-        session.console.print(f"{effect.label} in {scene.channel}", highlight=False, markup=False)
+        terminal.note(f"{effect.label} in {scene.channel}")
         yield {
             "name": scene.name,
             "family": family,

@@ -7,7 +7,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from jaxsub.cli import session
+from jaxsub.cli import terminal
 from jaxsub.estimate import METHODS, AbstractMethod, Chain, Global, basins, gauss_newton, mekf, scattered, success
 
 from . import setup
@@ -46,7 +46,7 @@ def run(out: Path, quick: bool) -> dict:
             found = jax.block_until_ready(_method(name).run(problem, chosen))
             lines[name] = line(problem, found, best) | {"seconds": time.perf_counter() - begin}
             kept.write_text(json.dumps(results), encoding="utf-8")
-            session.console.print(f"±{spread} {name}: {lines[name]['success']}", highlight=False)
+            terminal.note(f"±{spread} {name}: {lines[name]['success']}")
     rates(results, out / "sweep.png")
     return {"scenario": 2, "best_cost": best, "success_margin_in_cost": MARGIN, "spread": results}
 

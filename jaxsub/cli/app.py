@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from ..errors import InputError
+from .options import common
 
 _PATH = click.Path(path_type=Path)
 # said here and not asked of `estimate`, so that `--help` needs no jax; a test holds the two together
@@ -32,6 +33,7 @@ def app() -> None:
 @_out(default=Path("jaxsub-demo"), show_default=True)
 @click.option("--seed", default=0, show_default=True, help="Which effect is concealed, and the noise.")
 @_overwrite
+@common
 def demo(out: Path, seed: int, overwrite: bool) -> None:
     """Make recordings that conceal an effect, and diagnose them."""
     from . import demo as command
@@ -47,6 +49,7 @@ def demo(out: Path, seed: int, overwrite: bool) -> None:
 @click.option("--posterior", is_flag=True, help="Draw from the posterior too, into posterior.nc.")
 @_columns
 @_overwrite
+@common
 def identify(
     vehicle: Path,
     runs: tuple[Path, ...],
@@ -71,6 +74,7 @@ def identify(
 @click.option("--manoeuvre/--no-manoeuvre", default=True, help="Where rivals remain, look for the run that settles it.")
 @_columns
 @_overwrite
+@common
 def diagnose(
     vehicle: Path,
     runs: tuple[Path, ...],
@@ -93,6 +97,7 @@ def diagnose(
 @_out(required=True)
 @_columns
 @_overwrite
+@common
 def simulate(vehicle: Path, run: Path, out: Path, columns: Path | None, overwrite: bool) -> None:
     """Write the model's answer to a recording's inputs, as a recording."""
     from . import simulate as command
@@ -103,6 +108,7 @@ def simulate(vehicle: Path, run: Path, out: Path, columns: Path | None, overwrit
 @app.command()
 @click.argument("log", type=_PATH)
 @click.argument("words", nargs=-1)
+@common
 def channels(log: Path, words: tuple[str, ...]) -> None:
     """List the channels of a vehicle's log, or those whose names hold one of the words."""
     from . import channels as command

@@ -15,9 +15,10 @@ from ..simulate.manoeuvres import prbs
 from ..simulate.synthetic import sampled_states, synthetic
 from ..vehicle import AbstractVehicle, read_vehicle, write_vehicle
 from ..vehicle.catalogue import nps_auv_ii
-from . import session
+from . import session, terminal
 from .diagnose import show, write_diagnosis
 from .output import fresh_folder, refuse_existing
+from .runs import load_runs
 
 _SAMPLES, _INTERVAL, _RUNS = 800, 0.2, 3
 _WRONG = 0.2
@@ -46,11 +47,11 @@ def run(out: Path, seed: int, overwrite: bool) -> None:
     with fresh_folder(out, overwrite) as folder:
         concealed = make_files(folder, seed)
         vehicle = read_vehicle(folder / "vehicle.toml")
-        runs = session.load_runs(sorted(folder.glob("run*.csv")), vehicle)
+        runs = load_runs(sorted(folder.glob("run*.csv")), vehicle)
         diagnosis = write_diagnosis(vehicle, runs[:-1], runs[-1:], folder)
     show(diagnosis, out)
     if concealed is not None:
-        session.console.print(f"concealed was: {concealed.label}", highlight=False, markup=False)
+        terminal.note(f"concealed was: {concealed.label}")
 
 
 def make_files(folder: Path, seed: int, *chosen: AbstractEffect | None) -> AbstractEffect | None:

@@ -1,7 +1,6 @@
 """`jaxsub diagnose`: the whole path."""
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,11 +11,13 @@ from ..discrepancy import Diagnosis
 from ..discrepancy import diagnose as diagnose_runs
 from ..discrepancy.next_run import next_run, said
 from ..effects import AbstractEffect, from_script, vocabulary
+from ..plain import to_json
 from ..recording import Recording, hold_out, save
 from ..report import write_report
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
-from . import session
+from . import session, terminal
 from .output import fresh_folder, refuse_existing
+from .runs import load_runs
 
 _NEXT = "next_manoeuvre.csv"
 
@@ -40,11 +41,11 @@ def run(
     refuse_existing(out, overwrite)
     own = () if script is None else from_script(script)
     vehicle = read_vehicle(vehicle_path, own)
-    recordings = session.load_runs(runs, vehicle, columns)
-    train, judged = (recordings, session.load_runs(held, vehicle, columns)) if held else hold_out(recordings)
+    recordings = load_runs(runs, vehicle, columns)
+    train, judged = (recordings, load_runs(held, vehicle, columns)) if held else hold_out(recordings)
     with fresh_folder(out, overwrite) as folder:
         diagnosis = write_diagnosis(vehicle, train, judged, folder, (*vocabulary(), *own), manoeuvre)
-    show(diagnosis, out)
+    terminal.emit(diagnosis.to_json(), lambda: show(diagnosis, out))
 
 
 def write_diagnosis(
@@ -59,7 +60,7 @@ def write_diagnosis(
 
     Where rivals remain and a `manoeuvre` is wanted, `next_manoeuvre.csv` holds inputs that would tell them apart.
     """
-    with session.progress(f"diagnosing {vehicle.layout.name}") as told:
+    with terminal.progress(f"diagnosing {vehicle.layout.name}") as told:
         diagnosis, improved = diagnose_runs(vehicle, train, held, vocabulary=kinds, progress=told)
         if manoeuvre and diagnosis.explanations:
             told("looking for the manoeuvre that would settle it")
@@ -67,7 +68,7 @@ def write_diagnosis(
         told("writing the report")
         text = vehicle_text(improved, f"{vehicle.layout.name}, improved by jaxsub\n{diagnosis.summary}")
         (folder / "improved.toml").write_text(text, encoding="utf-8")
-        (folder / "diagnosis.json").write_text(json.dumps(diagnosis.to_json(), indent=1), encoding="utf-8")
+        (folder / "diagnosis.json").write_text(to_json(diagnosis.to_json()), encoding="utf-8")
         write_report(diagnosis, text, folder)
     return diagnosis
 
@@ -86,5 +87,5 @@ def show(diagnosis: Diagnosis, out: Path) -> None:
     held = diagnosis.fit["held_out"]
     channel = max(held["baseline"], key=lambda c: held["baseline"][c] / max(held["improved"][c], 1e-12))
     gain = f"held-out rms/σ of {channel}: {held['baseline'][channel]:.2f} before, {held['improved'][channel]:.2f} after"
-    session.console.print(Panel(Text(f"{diagnosis.summary}\n{gain}"), title=diagnosis.verdict, expand=False))
-    session.console.print(f"report: {out / 'report.html'}", highlight=False, markup=False)
+    terminal.results.print(Panel(Text(f"{diagnosis.summary}\n{gain}"), title=diagnosis.verdict, expand=False))
+    terminal.say(f"report: {out / 'report.html'}")

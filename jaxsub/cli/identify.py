@@ -2,23 +2,22 @@
 
 import csv
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.markup import escape
-from rich.table import Column, Table
 
 from ..discrepancy import batch
 from ..errors import InputError
 from ..estimate import METHODS, Fit, fit, posterior
 from ..identifiability import Coloured, Identifiability, Verdict, coloured_covariance, identifiability
+from ..plain import to_json
 from ..report.text import unit
 from ..results import RESULTS
 from ..vehicle import read_vehicle, write_vehicle
-from . import session
+from . import session, terminal
 from .output import fresh_folder, refuse_existing
+from .runs import load_runs
 
 
 def run(
@@ -37,8 +36,8 @@ def run(
     session.start()
     refuse_existing(out, overwrite)
     vehicle = read_vehicle(vehicle_path)
-    recordings = session.load_runs(runs, vehicle, columns)
-    with fresh_folder(out, overwrite) as folder, session.progress(f"identifying {vehicle.layout.name}") as told:
+    recordings = load_runs(runs, vehicle, columns)
+    with fresh_folder(out, overwrite) as folder, terminal.progress(f"identifying {vehicle.layout.name}") as told:
         told(f"fitting by {method}")
         # Gauss–Newton by its own name is what `fit` does unasked, and that finds a start where the file's does not run
         chosen = None if method == "gauss-newton" else METHODS[method.replace("-", "_")]()
@@ -84,7 +83,7 @@ def _write(found: Fit, said: Identifiability, coloured: Coloured, method: str, f
             for n, v in found.values.items()
         },
     }
-    (folder / "identification.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    (folder / "identification.json").write_text(to_json(content), encoding="utf-8")
 
 
 def _plain(verdict: Verdict) -> dict:
@@ -95,16 +94,15 @@ def _plain(verdict: Verdict) -> dict:
 
 def _show(found: Fit, said: Identifiability, coloured: Coloured) -> None:
     for sentence in said.sentences():
-        session.console.print(sentence, highlight=False, markup=False)
-    error = Column("standard error", no_wrap=True)
-    table = Table("coefficient", "value", error, "if residuals are coloured", "unit", "the recordings")
+        terminal.say(sentence)
+    rows = []
     white, wide = found.standard_errors, coloured.standard_errors
     kind = {verdict.name: verdict.kind for verdict in said.verdicts}
     units = {row.name: unit(row.unit) for row in found.vehicle.layout.free}
     for name, value in found.values.items():
         spread = (f"{errors[name]:.2g}" for errors in (white, wide))
-        table.add_row(escape(name), f"{value:.6g}", *spread, escape(units[name]), kind[name])
-    session.console.print(table)
+        rows.append((name, f"{value:.6g}", *spread, units[name], kind[name]))
+    terminal.table(("coefficient", "value", "standard error", "if residuals are coloured", "unit", "verdict"), rows)
     if not bool(found.result == RESULTS.successful):
         away = f"{float(found.gradient_norm):.2g} standard errors from the optimum"
-        session.console.print(f"Not converged: {RESULTS[found.result]} It is {away}.", highlight=False, markup=False)
+        terminal.say(f"Not converged: {RESULTS[found.result]} It is {away}.")

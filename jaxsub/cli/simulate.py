@@ -10,8 +10,9 @@ from ..errors import InputError
 from ..estimate import initial_guess, predict
 from ..recording import Recording, save
 from ..vehicle import read_vehicle
-from . import session
+from . import session, terminal
 from .output import refuse_existing
+from .runs import load_run
 
 
 def run(vehicle_path: Path, run_path: Path, out: Path, overwrite: bool, columns: Path | None = None) -> None:
@@ -23,10 +24,10 @@ def run(vehicle_path: Path, run_path: Path, out: Path, overwrite: bool, columns:
     session.start()
     refuse_existing(out, overwrite)
     vehicle = read_vehicle(vehicle_path)
-    recording = session.load_run(run_path, vehicle, columns)
+    recording = load_run(run_path, vehicle, columns)
     missing = {c: np.full(len(recording.times), np.nan) for c in vehicle.layout.channels if c not in recording.columns}
     given = Recording(recording.name, recording.times, recording.columns | missing, recording.source)
-    with session.progress(f"simulating {vehicle.layout.name}"):
+    with terminal.progress(f"simulating {vehicle.layout.name}"):
         runs = batch(vehicle, [given])
         start, _ = initial_guess(vehicle, runs)
         shown = np.asarray(predict(vehicle, runs, jnp.asarray(start)))[0]

@@ -1,7 +1,6 @@
 """`jaxsub sweep`: Monte-Carlo over initial guesses, noise, vehicles and recordings."""
 
 import dataclasses
-import json
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,17 +8,17 @@ from typing import Any
 
 import click
 import xarray
-from rich.markup import escape
-from rich.table import Table
 
 from ..errors import InputError
+from ..plain import to_json
 from ..recording import Recording
 from ..report import sweep_pictures
 from ..sweep import Plan, answered, check_folder, summarised
 from ..sweep import sweep as run_sweep
 from ..vehicle import AbstractVehicle, read_vehicle
-from . import session
+from . import session, terminal
 from .output import refuse_existing
+from .runs import load_runs
 
 _TOGETHER = "all"
 
@@ -56,14 +55,14 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
         check_folder(out, plan)
     done = [0, 0]
     try:
-        with session.counted(f"sweeping {', '.join(plan.vehicles)}") as tell:
+        with terminal.counted(f"sweeping {', '.join(plan.vehicles)}") as tell:
 
             def progress(count: int, total: int) -> None:
                 done[:] = count, total
                 tell(count, total)
 
             dataset = run_sweep(plan, out, cluster=asked.cluster, progress=progress)
-        with session.progress("summarising") as say:
+        with terminal.progress("summarising") as say:
             say("basins and figures")
             summary = summarised(plan, dataset)
             _write(summary, dataset, out)
@@ -73,7 +72,7 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
         ) from stop
     for case in summary["cases"]:
         _show(case)
-    session.console.print(f"{summary['done']} searches in {out}", highlight=False, markup=False)
+    terminal.say(f"{summary['done']} searches in {out}")
 
 
 def _remove(out: Path) -> None:
@@ -87,9 +86,9 @@ def make_plan(asked: Asked) -> Plan:
     """The plan that was asked for. Raises `InputError` for whatever cannot be read or does not fit."""
     vehicles = _by_stem([asked.vehicle, *asked.others], read_vehicle)
     first = next(iter(vehicles.values()))
-    recordings = session.load_runs(asked.runs, first)
+    recordings = load_runs(asked.runs, first)
     for other in list(vehicles.values())[1:]:
-        session.load_runs(asked.runs, other)
+        load_runs(asked.runs, other)
     if len({recording.name for recording in recordings}) < len(recordings):
         raise InputError(", ".join(map(str, asked.runs)), "two runs have one name", "rename one of the files")
     if asked.noise_seeds:
@@ -118,7 +117,7 @@ def _write(summary: dict, dataset: xarray.Dataset, out: Path) -> None:
     (out / "figures").mkdir(exist_ok=True)
     for picture in sweep_pictures(dataset, summary):
         (out / "figures" / f"{picture.name}.png").write_bytes(picture.png)
-    (out / "sweep.json").write_text(json.dumps(summary, indent=1), encoding="utf-8")
+    (out / "sweep.json").write_text(to_json(summary), encoding="utf-8")
 
 
 def _show(case: dict) -> None:
@@ -132,15 +131,15 @@ def _show(case: dict) -> None:
         "outcomes: " + ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in case["outcomes"].items()),
     ]
     for line in lines:
-        session.console.print(line, highlight=False, markup=False, soft_wrap=True)
+        terminal.say(line)
     bootstrap = any("spread_over_noise" in told for told in case["coefficients"].values())
-    table = Table("coefficient", "best", "standard error", "5 to 95 % of ends", *(["spread over noise"] * bootstrap))
+    headers, rows = ["coefficient", "best", "standard error", "5 to 95 % of ends"], []
     for name, told in case["coefficients"].items():
         ends = told["percentiles_5_50_95"]
         reach = f"{ends[0]:.6g} to {ends[2]:.6g}" if ends else "none"
-        row = [escape(name), _said(told["best"], 6), _said(told["standard_error"], 2), reach]
-        table.add_row(*row, *([_said(told["spread_over_noise"], 2)] if bootstrap else []))
-    session.console.print(table)
+        row = [name, _said(told["best"], 6), _said(told["standard_error"], 2), reach]
+        rows.append([*row, *([_said(told["spread_over_noise"], 2)] if bootstrap else [])])
+    terminal.table([*headers, *(["spread over noise"] * bootstrap)], rows)
 
 
 def _said(value: float | None, digits: int) -> str:

@@ -2,11 +2,12 @@
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from jaxsub.errors import InputError, nearest
+from jaxsub.findings import Finding
 from jaxsub.units import TIME, UnknownUnit, check_time_unit, from_si
 
 FIRST_ROW = 2  # in a file the header is row 1
@@ -18,6 +19,8 @@ class Recording:
 
     `times` is (samples,) in s and `columns` maps a name to (samples,). `source` is the file or process that made the
     run and `first_row` the row of its first sample there; errors quote both. The arrays are read-only copies.
+    `units` has the SI unit of each column whose file states one; `unusable` the error of each column that holds no
+    numbers or has a unit that is none, raised when the column is used; `findings` what reading and checking found.
     Raises InputError for fewer than two samples, a time that is not finite or not later than the one before, an
     infinite sample, columns of unequal length, or a name that a file header could not hold.
     """
@@ -27,6 +30,9 @@ class Recording:
     columns: dict[str, np.ndarray]
     source: str
     first_row: int = FIRST_ROW
+    units: Mapping[str, str] = field(default_factory=dict)
+    unusable: Mapping[str, InputError] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self):
         object.__setattr__(self, "times", _read_only(self.times))
@@ -41,9 +47,11 @@ class Recording:
         return float(self.times[-1]) - float(self.times[0])
 
     def column(self, name: str) -> np.ndarray:
-        """Return the samples of one column, (samples,). Raises InputError when there is no such column."""
+        """Return the samples of one column, (samples,). Raises InputError for one that is absent or unusable."""
         if name in self.columns:
             return self.columns[name]
+        if name in self.unusable:
+            raise self.unusable[name]
         close = nearest(name, self.columns)
         remedy = f"did you mean {close!r}?" if close else f"its columns are {', '.join(self.columns) or 'none'}"
         raise InputError(self.source, f"has no column {name!r}", remedy)

@@ -35,7 +35,7 @@ def identify(monkeypatch, capsys, folder, *options):
     arguments = [folder / "vehicle.toml", folder / "run.csv", "--out", folder / "out", *options]
     monkeypatch.setattr("sys.argv", ["jaxsub", "identify", *map(str, arguments)])
     main()
-    return capsys.readouterr().err
+    return capsys.readouterr().out
 
 
 def test_methods_offered_are_those_there_are():
