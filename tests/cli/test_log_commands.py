@@ -88,7 +88,7 @@ def test_simulation_follows_the_log(folder, monkeypatch, capsys):
 
 
 def test_inputs_are_held_and_outputs_missing_between_samples(folder):
-    from jaxsub.cli.session import load_runs
+    from jaxsub.cli.runs import load_runs
     from jaxsub.vehicle import read_vehicle
 
     (folder / "fine.toml").write_text(COLUMNS.replace("0.05", "0.025"), encoding="utf-8")
