@@ -2,7 +2,6 @@
 
 import functools
 import re
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from jaxsub.errors import InputError, nearest
 
 TIME = "t"  # the column that holds the time
+ACCELERATIONS = ("ax", "ay", "az")  # the columns that hold specific forces
 
 _COMMON = (
     "m", "cm", "mm", "km", "ft", "s", "ms", "min", "hour", "rad", "deg", "degree", "m/s", "knot", "rad/s", "deg/s",
@@ -83,35 +83,28 @@ def check_time_unit(where: str, unit: str) -> None:
         raise InputError(where, f"{unit!r} is no unit of time", f"write {TIME}[s]")
 
 
-def si_columns(source: str, table: Iterable[tuple[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Convert columns headed `name[unit]`, or `name` for SI, to SI under their names alone.
-
-    Raises InputError, naming `source` and the header, for an unknown unit, a time column `t` in a unit that is not one
-    of time, and two headers with one name.
-    """
-    headers, columns = {}, {}
-    for header, values in table:
-        name, unit = split_header(header)
-        if name in headers:
-            what = f"headers {headers[name]!r} and {header!r} name one column"
-            raise InputError(source, what, "rename or delete one")
-        headers[name] = header
-        columns[name] = values if unit is None else _column_to_si(f"{source}, header {header!r}", name, values, unit)
-    return columns
-
-
 def split_header(header: str) -> tuple[str, str | None]:
     """The name and the unit of a header `name[unit]`, the unit None where there are no brackets."""
     match = re.fullmatch(r"([^\[\]]*)\[([^\[\]]*)\]", header.strip())
     return (match[1].strip(), match[2]) if match else (header.strip(), None)
 
 
-def _column_to_si(where: str, name: str, values: np.ndarray, unit: str) -> np.ndarray:
+def column_unit(name: str, unit: str) -> str:
+    """What `unit` means over the column `name`: `g` is standard gravity where that is an acceleration, else gram."""
+    return {"g": "g_n", "mg": "mg_n"}.get(unit.strip(), unit) if name in ACCELERATIONS else unit
+
+
+def column_to_si(where: str, name: str, values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
+    """The samples of a column `name` in SI and their SI unit, `1` where it has no dimension.
+
+    Raises InputError, at `where`, for an unknown unit and for a time column `t` in a unit that is not one of time.
+    """
     unit = re.sub(r"\s+since\s.*", "", unit)  # a NetCDF time; when the run took place does not matter here
     try:
         if name == TIME:
             check_time_unit(where, unit)
-        return to_si(values, unit)
+        unit = column_unit(name, unit)
+        return to_si(values, unit), si_unit(unit) or "1"
     except UnknownUnit as error:
         raise InputError(where, str(error), error.remedy) from error
 

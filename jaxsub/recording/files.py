@@ -13,7 +13,7 @@ import xarray
 from pyarrow import parquet
 
 from jaxsub.errors import InputError
-from jaxsub.recording.frames import Table, numeric, recorded, to_pandas, to_xarray, variables
+from jaxsub.recording.frames import Table, recorded, to_pandas, to_xarray, variables
 from jaxsub.recording.logs import SUFFIXES, Selection, load_log
 from jaxsub.recording.recording import FIRST_ROW, Recording
 
@@ -90,18 +90,7 @@ def _read_csv(path: Path) -> Table:
         if len(cells) != len(header):
             what = f"{len(cells)} cells under {len(header)} headers"
             raise InputError(f"{path}, row {row}", what, "give every row a cell for each header")
-    return [(name, _numbers(path, name, [cells[i] for cells in body])) for i, name in enumerate(header)]
-
-
-def _numbers(path: Path, header: str, cells: list[str]) -> np.ndarray:
-    values = np.full(len(cells), np.nan)
-    for index, cell in enumerate(cells):
-        try:
-            values[index] = float(cell.strip() or "nan")
-        except ValueError as error:
-            where = f"{path}, row {index + FIRST_ROW}, column {header!r}"
-            raise InputError(where, f"{cell!r} is not a number", "write a number or leave the cell blank") from error
-    return values
+    return [(name, np.array([cells[i] for cells in body], object)) for i, name in enumerate(header)]
 
 
 def _write_csv(path: Path, recording: Recording, units: Units) -> None:
@@ -112,7 +101,7 @@ def _read_parquet(path: Path) -> Table:
     with _reading(path, "Parquet"), parquet.ParquetFile(path) as file:
         table = file.read()
         columns = [column.to_numpy() for column in table.columns]
-    return [(name, numeric(str(path), name, values)) for name, values in zip(table.column_names, columns, strict=True)]
+    return list(zip(table.column_names, columns, strict=True))
 
 
 def _write_parquet(path: Path, recording: Recording, units: Units) -> None:

@@ -9,10 +9,15 @@ import pandas
 import xarray
 
 from jaxsub.errors import InputError, nearest
-from jaxsub.recording.recording import Recording
-from jaxsub.units import TIME, si_columns
+from jaxsub.findings import Finding
+from jaxsub.recording.recording import FIRST_ROW, Recording, check_column
+from jaxsub.units import TIME, column_to_si, split_header
 
-Table = list[tuple[str, np.ndarray]]  # as read, when a header may still occur twice
+# As read: headers, which may still occur twice, and numbers, text or objects; an error where a reader knows that a
+# column cannot be used.
+Table = list[tuple[str, np.ndarray | InputError]]
+
+_ONE_NUMBER = "give one number a sample or leave the column out"
 
 
 def from_pandas(frame: pandas.DataFrame, name: str = "run") -> Recording:
@@ -21,13 +26,13 @@ def from_pandas(frame: pandas.DataFrame, name: str = "run") -> Recording:
     The time is the column `t`; else the index, if that is named `t` or holds times or spans. Instants count in s from
     the first. Raises InputError for whatever a file would be refused for, naming `name`.
     """
-    table = [(str(header), _of_series(name, header, column)) for header, column in frame.items()]
+    table = [(str(header), _of_series(column)) for header, column in frame.items()]
     if not any(_is_time(header) for header, _ in table):
         index = frame.index
         if _is_time(str(index.name)):
-            table.append((str(index.name), _of_series(name, str(index.name), index.to_series())))
+            table.append((str(index.name), _of_series(index.to_series())))
         elif isinstance(index, pandas.DatetimeIndex | pandas.TimedeltaIndex):
-            table.append((TIME, _of_series(name, TIME, index.to_series())))
+            table.append((TIME, _of_series(index.to_series())))
     return recorded(table, name, name)
 
 
@@ -62,42 +67,110 @@ def to_xarray(recording: Recording, units: Mapping[str, str] | None = None) -> x
     return dataset
 
 
-def recorded(table: Table, name: str, source: str) -> Recording:
-    """The run `name` from headed columns in their own units. Raises InputError, naming `source`, for a bad one."""
-    columns = si_columns(source, table)
-    if TIME not in columns:
-        similar = next((name for name in columns if "time" in name.lower()), nearest(TIME, columns))
+def recorded(
+    table: Table, name: str, source: str, first_row: int = FIRST_ROW, findings: tuple[Finding, ...] = ()
+) -> Recording:
+    """The run `name` from headed columns as read, numbers or text, in their own units.
+
+    `first_row` is the row of the first sample in `source`. A column that holds no numbers, whose unit is none or whose
+    name occurs twice goes to `Recording.unusable`, since most logs have some that no vehicle needs. Raises InputError,
+    naming `source`, for times that are absent, no numbers or not in order.
+    """
+    headers: dict[str, list[str]] = {}
+    for header, _ in table:
+        headers.setdefault(split_header(header)[0], []).append(header)
+    if TIME not in headers:
+        similar = next((name for name in headers if "time" in name.lower()), nearest(TIME, headers))
         remedy = f"rename {similar!r} to {TIME!r}" if similar else f"add a column headed {TIME}[s]"
         raise InputError(source, f"has no time column {TIME!r}", remedy)
-    return Recording(name, columns.pop(TIME), columns, source)
+    values = dict(table)
+    times, _ = _in_si(source, headers[TIME], values, first_row)
+    columns, units, unusable = {}, {}, {}
+    for column, named in headers.items():
+        if column == TIME:
+            continue
+        try:
+            samples, unit = _in_si(source, named, values, first_row)
+            check_column(source, first_row, times, column, samples)
+        except InputError as error:
+            unusable[column] = error
+            continue
+        columns[column] = samples
+        units |= {column: unit} if unit else {}
+    return Recording(name, times, columns, source, first_row, units, unusable, findings)
+
+
+def _in_si(
+    source: str, named: list[str], values: Mapping[str, np.ndarray | InputError], first_row: int
+) -> tuple[np.ndarray, str]:
+    """The samples under the headers `named`, in SI, and their unit, empty where the header states none."""
+    if len(named) > 1:
+        raise InputError(source, f"headers {' and '.join(map(repr, named))} name one column", "rename or delete one")
+    name, unit = split_header(named[0])
+    samples = numeric(source, named[0], values[named[0]], first_row)
+    return (samples, "") if unit is None else column_to_si(f"{source}, header {named[0]!r}", name, samples, unit)
 
 
 def variables(dataset: xarray.Dataset, source: str) -> Table:
     """The variables of a dataset with their units in their headers."""
-    table = []
+    along = next((variable.dims for name, variable in dataset.variables.items() if _is_time(str(name))), None)
+    table: Table = []
     for name, variable in dataset.variables.items():
         bare = "units" in variable.attrs and "[" not in str(name)
-        header = f"{name}[{variable.attrs['units']}]" if bare else str(name)
-        table.append((header, numeric(source, str(name), variable.to_numpy())))
+        unit = re.sub(r"[\[\]]", "", str(variable.attrs.get("units")))
+        header = f"{name}[{unit}]" if bare else str(name)
+        if along in (None, variable.dims):
+            table.append((header, variable.to_numpy()))
+        else:
+            what = f"runs along {_listed(variable.dims)}, its times along {_listed(along)}"
+            table.append((header, InputError(f"{source}, variable {name!r}", what, _ONE_NUMBER)))
     return table
 
 
-def numeric(source: str, header: str, values: np.ndarray) -> np.ndarray:
+def numeric(source: str, header: str, values: np.ndarray | InputError, first_row: int = FIRST_ROW) -> np.ndarray:
     """One number a sample, float64; a time that holds instants or spans in s. Raises InputError for anything else."""
+    if isinstance(values, InputError):
+        raise values
     if values.ndim == 1 and values.dtype.kind in "mM" and _is_time(header):
         return (values - values[:1] if values.dtype.kind == "M" else values) / np.timedelta64(1, "s")
+    if values.ndim == 1 and values.dtype.kind in "OUST":
+        return _parsed(source, header, values, first_row)
     if values.dtype.kind not in "biuf" or values.ndim != 1:
         what = f"holds {values.ndim}-dimensional {values.dtype} data"
-        raise InputError(f"{source}, column {header!r}", what, "give one number a sample or leave the column out")
+        raise InputError(f"{source}, column {header!r}", what, _ONE_NUMBER)
     return values.astype(np.float64)
 
 
-def _of_series(source: str, header: Hashable, series: Any) -> np.ndarray:
+def _parsed(source: str, header: str, cells: np.ndarray, first_row: int) -> np.ndarray:
+    """The numbers that cells of text or objects hold, NaN for blank ones."""
+    numbers = np.empty(len(cells))
+    for index, cell in enumerate(cells):
+        try:
+            text = cell.decode() if isinstance(cell, bytes) else cell
+            # float() would read 1_000 as a thousand
+            if not isinstance(text, str):
+                numbers[index] = np.nan if text is None or text is pandas.NA else float(text)
+            elif text.isascii() and "_" not in text:
+                numbers[index] = float(text.strip() or "nan")
+            else:
+                raise ValueError
+        except (TypeError, ValueError, OverflowError) as error:
+            where = f"{source}, row {index + first_row}, column {header!r}"
+            shown = repr(str(cell) if isinstance(cell, str) else cell)  # a NumPy string shows its type
+            raise InputError(where, f"{shown:.60} is not a number", "write a number or leave the cell blank") from error
+    return numbers
+
+
+def _listed(dimensions: tuple[Hashable, ...]) -> str:
+    return " and ".join(map(repr, dimensions)) or "nothing"
+
+
+def _of_series(series: Any) -> np.ndarray:
     if pandas.api.types.is_extension_array_dtype(series.dtype) and pandas.api.types.is_numeric_dtype(series.dtype):
         return series.to_numpy(np.float64, na_value=np.nan)
     if isinstance(series.dtype, pandas.DatetimeTZDtype):
         series = series.dt.tz_convert(None)
-    return numeric(source, str(header), series.to_numpy())
+    return series.to_numpy()
 
 
 def _is_time(header: str) -> bool:

@@ -39,7 +39,7 @@ class Recording:
         object.__setattr__(self, "columns", {name: _read_only(values) for name, values in self.columns.items()})
         self._check_times()
         for name, values in self.columns.items():
-            self._check_column(name, values)
+            check_column(self.source, self.first_row, self.times, name, values)
 
     @property
     def duration(self) -> float:
@@ -91,7 +91,8 @@ class Recording:
             name: self._hold(values, times) if name in held else self._interpolate(values, times)
             for name, values in self.columns.items()
         }
-        return Recording(self.name, times, columns, f"{self.source} (resampled)")
+        source = f"{self.source} (resampled)"
+        return replace(self, times=times, columns=columns, source=source, first_row=FIRST_ROW)
 
     def in_units(self, units: Mapping[str, str]) -> dict[str, np.ndarray]:
         """Return times and columns as a file holds them, headed `name[unit]` where `units` gives one, else `name`.
@@ -131,16 +132,21 @@ class Recording:
             what = f"time {after} s does not come after {before} s"
             raise InputError(f"{self.source}, row {row + 1}", what, "times must increase from row to row")
 
-    def _check_column(self, name: str, values: np.ndarray) -> None:
-        where = f"{self.source}, column {name!r}"
-        if name == TIME or not re.fullmatch(r"[^\s\[\]]([^\[\]]*[^\s\[\]])?", name):
-            raise InputError(where, "cannot be a column name", "head a column name or name[unit]")
-        if values.shape != self.times.shape:
-            what = f"has shape {values.shape} beside {self.times.size} times"
-            raise InputError(where, what, "give one sample for each time")
-        if (row := self._first(np.isinf(values))) is not None:
-            where = f"{self.source}, row {row}, column {name!r}"
-            raise InputError(where, "an infinite sample", "leave the cell blank if it is missing")
+
+def check_column(source: str, first_row: int, times: np.ndarray, name: str, values: np.ndarray) -> None:
+    """Raise InputError for a column of a run that has another length than its `times`, or an infinite sample.
+
+    A name that a file's header could not hold is refused as well.
+    """
+    where = f"{source}, column {name!r}"
+    if name == TIME or not re.fullmatch(r"[^\s\[\]]([^\[\]]*[^\s\[\]])?", name):
+        raise InputError(where, "cannot be a column name", "head a column name or name[unit]")
+    if values.shape != times.shape:
+        what = f"has shape {values.shape} beside {times.size} times"
+        raise InputError(where, what, "give one sample for each time")
+    if (infinite := np.isinf(values)).any():
+        where = f"{source}, row {first_row + int(np.argmax(infinite))}, column {name!r}"
+        raise InputError(where, "an infinite sample", "leave the cell blank if it is missing")
 
 
 def _read_only(values: np.ndarray) -> np.ndarray:

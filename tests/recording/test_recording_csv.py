@@ -41,21 +41,14 @@ CSV_REFUSALS = {
     "no time": ("time[s],u\n0,1\n1,2\n", ": has no time column 't'; rename 'time' to 't'"),
     "nothing like time": ("u\n0\n1\n", ": has no time column 't'; add a column headed t[s]"),
     "time in metres": ("t[m],u\n0,1\n1,2\n", ", header 't[m]': 'm' is no unit of time; "),
-    "text": ("t,u\n0,1\n1,fast\n", ", row 3, column 'u': 'fast' is not a number; "),
     "text in time": ("t,u\n0,1\n12:00,2\n", ", row 3, column 't': '12:00' is not a number; "),
     "comment": ("t,u\n# c,1\n1,2\n", ", row 2, column 't': '# c' is not a number; "),
-    "infinite": ("t,u\n0,1\n1,inf\n", ", row 3, column 'u': an infinite sample; "),
-    "overflow": ("t,u[km]\n0,1\n1,1e307\n", ", row 3, column 'u': an infinite sample; "),
     "blank time": ("t,u\n0,1\n,2\n2,3\n", ", row 3: the time is missing or not finite; "),
     "repeated time": ("t,u\n0,1\n1,2\n1,3\n", ", row 4: time 1.0 s does not come after 1.0 s; "),
     "decreasing time": ("t,u\n5,1\n1,2\n", ", row 3: time 1.0 s does not come after 5.0 s; "),
     "long row": ("t,u\n0,1\n1,2,3\n", ", row 3: 3 cells under 2 headers; "),
     "short row": ("t,u\n0\n1,2\n", ", row 2: 1 cells under 2 headers; "),
     "blank line": ("t,u\n0,1\n\n1,2\n", ", row 3: 0 cells under 2 headers; "),
-    "unit": ("t,u[knts]\n0,1\n1,2\n", ", header 'u[knts]': unknown unit 'knts'; did you mean 'knot'?"),
-    "twice": ("t,u,u[knot]\n0,1,1\n1,2,2\n", ": headers 'u' and 'u[knot]' name one column; "),
-    "bracket": ("t,u[knot\n0,1\n1,2\n", ", column 'u[knot': cannot be a column name; "),
-    "nameless": (",t\n0,1\n1,2\n", ", column '': cannot be a column name; "),
     "not UTF-8": ("t,u\n0,1\n1,2\n".encode("utf-16"), ": cannot be read ("),
     "huge cell": ("t,u\n0," + "1" * 200_000, ": cannot be read (field larger"),
 }
@@ -66,6 +59,29 @@ def test_defective_csv_is_refused_at_its_place(tmp_path, text, message):
     path = tmp_path / "run.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     assert refusal(path).startswith(message)
+
+
+CSV_UNUSABLE = {
+    "text": ("t,u\n0,1\n1,fast\n", ", row 3, column 'u': 'fast' is not a number; ", "u"),
+    "infinite": ("t,u\n0,1\n1,inf\n", ", row 3, column 'u': an infinite sample; ", "u"),
+    "overflow": ("t,u[km]\n0,1\n1,1e307\n", ", row 3, column 'u': an infinite sample; ", "u"),
+    "unit": ("t,u[knts]\n0,1\n1,2\n", ", header 'u[knts]': unknown unit 'knts'; did you mean 'knot'?", "u"),
+    "twice": ("t,u,u[knot]\n0,1,1\n1,2,2\n", ": headers 'u' and 'u[knot]' name one column; ", "u"),
+    "bracket": ("t,u[knot\n0,1\n1,2\n", ", column 'u[knot': cannot be a column name; ", "u[knot"),
+    "nameless": (",t\n0,1\n1,2\n", ", column '': cannot be a column name; ", ""),
+    "underscores": ("t,u\n0,1\n1,1_000\n", ", row 3, column 'u': '1_000' is not a number; ", "u"),
+}
+
+
+@pytest.mark.parametrize(("text", "message", "column"), CSV_UNUSABLE.values(), ids=CSV_UNUSABLE)
+def test_defective_column_is_refused_when_asked_for(tmp_path, text, message, column):
+    run = load_csv(tmp_path, text)
+    assert column not in run.columns
+    for part in (run, run.select(run.times < 9), run.resample(run.times)):
+        with pytest.raises(InputError) as caught:
+            part.column(column)
+        assert str(caught.value).removeprefix(run.source).startswith(message)
+        assert len(str(caught.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """A log of any kind, by its suffix, as a list of channels or as a recording."""
 
+import dataclasses
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
@@ -9,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
-from ...units import TIME, UnknownUnit, split_header, to_si
+from ...units import TIME, UnknownUnit, column_unit, si_unit, split_header, to_si
 from ..recording import Recording
 from .log import Channel, Log, Series, taken
 from .mcap import McapLog
@@ -58,15 +59,18 @@ def load_log(
         found = taken(log, str(path), sorted({t.channel for t in terms.values() if t.function not in _AXES}))
         turned = {c: _attitude(log, path, c) for c in {t.channel for t in terms.values() if t.function in _AXES}}
     columns: dict[str, Series] = {}
+    units: dict[str, str] = {}
     for header, term in terms.items():
         name, unit = split_header(header)
         where = f"{chosen.source}, column {header!r}"
         if name in columns or name == TIME:
             raise InputError(where, "is there already", "give each column one line; a log brings its own times")
         source = turned[term.channel][term.function] if term.function in _AXES else found[term.channel]
-        columns[name] = _column(where, source, term, unit)
+        columns[name] = _column(where, name, source, term, unit)
+        units |= {name: columns[name].unit} if columns[name].unit else {}
     span = {"every": chosen.every, "start": chosen.start, "end": chosen.end}
-    return merged(columns, path.stem, str(path), held=held, interpolated=interpolated, **span)
+    run = merged(columns, path.stem, str(path), held=held, interpolated=interpolated, **span)
+    return dataclasses.replace(run, units=units)
 
 
 def opened(path: Path) -> Log:
@@ -79,17 +83,17 @@ def opened(path: Path) -> Log:
     return kind(path)
 
 
-def _column(where: str, series: Series, term: Term, unit: str | None) -> Series:
-    """In SI, turned and scaled as `term` says."""
-    stated = series.unit if unit is None else unit
+def _column(where: str, name: str, series: Series, term: Term, unit: str | None) -> Series:
+    """In SI, turned and scaled as `term` says; without a unit where a factor may change it."""
+    stated = column_unit(name, series.unit if unit is None else unit)
     try:
-        values = to_si(series.values, stated) if stated else series.values
+        values, si = (to_si(series.values, stated), si_unit(stated) or "1") if stated else (series.values, "")
     except UnknownUnit as error:
         raise InputError(where, str(error), f"state the channel's unit as name[unit]; {error.remedy}") from error
     if term.function == "unwrap":
         kept = ~np.isnan(values)
         series, values = Series(series.times[kept], values[kept]), np.unwrap(values[kept])
-    return Series(series.times, term.factor * values)
+    return Series(series.times, term.factor * values, si if abs(term.factor) == 1.0 else "")
 
 
 def _attitude(log: Log, path: Path, name: str) -> dict[str, Series]:
