@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy import special
 
+from ..likelihood.whiteness import portmanteau
 from ..recording import Recording
 from ..vehicle import Layout
 from .diagnosis import Remainder
 from .show import LONG_BLOCKS
-from .whiteness import portmanteau
 
 CHANCE = 1e-3  # below it what remains is not random, or goes with an input
 _DELAYS = 60  # from one sample to a quarter of the longest run

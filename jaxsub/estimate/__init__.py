@@ -1,5 +1,6 @@
 """Estimation: one `fit`, one `Fit`, and the methods that may do it."""
 
+from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_residuals
 from .combined import Chain, Global
 from .disturbance import estimate_disturbance
 from .ends import Ends, ends
@@ -8,15 +9,18 @@ from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, out
 from .method import AbstractMethod, Found, Iterative, share_for, shares_at_once
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .posterior import posterior
-from .problem import Expansion, Problem, initial_guess
+from .problem import Expansion, Problem, initial_guess, require_free
 from .starts import MARGIN, Basin, Rate, basins, scattered, scattered_by_number, success
 
 __all__ = [
+    "LEVEL",
     "MARGIN",
     "METHODS",
     "AbstractMethod",
+    "Assessment",
     "Basin",
     "Chain",
+    "ChannelResidual",
     "Ended",
     "Ends",
     "Expansion",
@@ -27,6 +31,8 @@ __all__ = [
     "Iterative",
     "Problem",
     "Rate",
+    "assess",
+    "assess_residuals",
     "basins",
     "channel_rms",
     "ekf",
@@ -45,6 +51,7 @@ __all__ = [
     "output_errors",
     "posterior",
     "predict",
+    "require_free",
     "scattered",
     "scattered_by_number",
     "search",

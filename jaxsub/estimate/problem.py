@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..effects import CHANNEL_UNITS
+from ..errors import InputError
 from ..likelihood import errors
 from ..likelihood.march import March
 from ..parameters import Transform
@@ -186,6 +187,12 @@ class Problem(eqx.Module):
         """The cost about `y` to second order, its curvature exact."""
         cost, gradient, hessian, _ = second_order(lambda y, _: (self.cost(y), None), y, None)
         return Expansion(cost, gradient, hessian)
+
+
+def require_free(vehicle: AbstractVehicle, where: str) -> None:
+    """`vehicle`, read from `where`, has a number to fit. **Raises** `InputError` where all are fixed."""
+    if not vehicle.layout.free:
+        raise InputError(where, "all coefficients are fixed, so there is nothing to fit", "leave at least one free")
 
 
 class Expansion(eqx.Module):

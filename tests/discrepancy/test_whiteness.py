@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from jaxsub.discrepancy.whiteness import memory, portmanteau, remembered
+from jaxsub.discrepancy.whiteness import memory
+from jaxsub.likelihood.whiteness import portmanteau, remembered
 
 
 def innovations(rho: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
