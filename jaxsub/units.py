@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from jaxsub.errors import InputError, nearest
+from jaxsub.unit_names import AMBIGUOUS, PHRASES, unit_name
 
 TIME = "t"  # the column that holds the time
 ACCELERATIONS = ("ax", "ay", "az")  # the columns that hold specific forces
@@ -22,6 +23,7 @@ _PRETTY = (
     "Pa",
     "V",
     "W",
+    "T",
     "kg/m³",
     "m³",
     "m²",
@@ -37,23 +39,26 @@ _PRETTY = (
     "rad/s²",
 )
 
-# Unit text is evaluated by pint, where `9**9**9` would run for ever. So only names with a one-digit power get that far.
-_FACTOR = r"(?:1|%|[^\W\d]\w*|°\w*)(?:\s*(?:\^|\*\*)\s*-?\d)?"
-_SAFE = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*")
+# Unit text is evaluated by pint, where `9**9**9` would run for ever. So only a first factor and names with a one-digit
+# power get that far.
 _LONGEST = 60
-
-# `m s-2`, the way NetCDF conventions write a power.
-_BARE_POWER = re.compile(r"(?<=[^\W\d_])(-?\d)(?!\w)")
+_NUMBER = r"\d{1,9}(?:\.\d{1,9})?(?:[eE][+-]?\d\d?)?"
+_NAME = r"degE[57]|g_?0|°?[^\W\d_](?:[^\W\d]*[^\W\d_])?|[°%℃℉]"
+_TOKEN = re.compile(rf"\s*(?:(?P<name>{_NAME})(?:\s*(?:\^|\*\*)\s*|)(?P<power>[+-]?\d)?(?![\w^])|(?P<sign>[*/()-]))\s*")
+# what stands for what in unit texts: powers as printers set them, letters that look alike, signs of a product
+_LIKE = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−µμº·⋅×•", "0123456789--uu°****")
 
 
 class UnknownUnit(ValueError):
-    """A text is no unit: `unit` is the text and `remedy` says what to write instead."""
+    """A text is no unit, or may mean several: `unit` is the text and `remedy` says what to write instead."""
 
-    def __init__(self, unit: str):
+    def __init__(self, unit: str, meanings: str = ""):
         self.unit = unit
         close = nearest(unit, _COMMON)
         self.remedy = f"did you mean {close!r}?" if close else "write it like m/s, deg or kg/m^3"
-        super().__init__(f"unknown unit {unit!r}")
+        if meanings:
+            self.remedy = f"write {meanings}"
+        super().__init__(f"unit {unit!r} is ambiguous" if meanings else f"unknown unit {unit!r}")
 
 
 def to_si(values: np.ndarray, unit: str) -> np.ndarray:
@@ -61,19 +66,20 @@ def to_si(values: np.ndarray, unit: str) -> np.ndarray:
 
     An empty `unit` or `1` is dimensionless. A value too large for float64 becomes infinite. Raises UnknownUnit.
     """
-    given, base = _units(unit)
-    return _convert(values, given, base)
+    factor, given, base = _units(unit)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _convert(np.array(values, np.float64) * factor, given, base)
 
 
 def from_si(values: np.ndarray, unit: str) -> np.ndarray:
     """Convert `values` (any shape) from SI base units to `unit`; the inverse of `to_si`. Raises UnknownUnit."""
-    given, base = _units(unit)
-    return _convert(values, base, given)
+    factor, given, base = _units(unit)
+    return _convert(np.array(values, np.float64), base, given) / factor
 
 
 def si_unit(unit: str) -> str:
     """Return the SI unit that `to_si` converts `unit` to, for reading: `rad/s` for `rpm`. Raises UnknownUnit."""
-    _, base = _units(unit)
+    *_, base = _units(unit)
     return _pretty().get(base) or f"{base:~P}"
 
 
@@ -91,7 +97,8 @@ def split_header(header: str) -> tuple[str, str | None]:
 
 def column_unit(name: str, unit: str) -> str:
     """What `unit` means over the column `name`: `g` is standard gravity where that is an acceleration, else gram."""
-    return {"g": "g_n", "mg": "mg_n"}.get(unit.strip(), unit) if name in ACCELERATIONS else unit
+    gravity = {"g": "g_n", "G": "g_n", "mg": "mg_n", "mG": "mg_n"}
+    return gravity.get(unit.strip(), unit) if name in ACCELERATIONS else unit
 
 
 def column_to_si(where: str, name: str, values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
@@ -111,7 +118,7 @@ def column_to_si(where: str, name: str, values: np.ndarray, unit: str) -> tuple[
 
 def _convert(values: np.ndarray, source: Any, target: Any) -> np.ndarray:
     with np.errstate(over="ignore", invalid="ignore"):
-        return _registry().Quantity(np.array(values, np.float64), source).to(target).magnitude
+        return _registry().Quantity(values, source).to(target).magnitude
 
 
 @functools.cache
@@ -123,18 +130,58 @@ def _registry() -> Any:
 
 
 @functools.cache
-def _units(unit: str) -> tuple[Any, Any]:
-    """Return `unit` and the SI base unit it converts to, as pint units."""
-    text = _BARE_POWER.sub(r"**\1", unit.strip())
-    if len(text) > _LONGEST or not _SAFE.fullmatch(re.sub(r"[()]", "", text) or "1"):
+def _units(unit: str) -> tuple[float, Any, Any]:
+    """Return `unit` as a factor and a pint unit, and the SI base unit that it converts to."""
+    if len(unit) > _LONGEST:
         raise UnknownUnit(unit)
+    factor, expression = _expression(unit)
     try:
-        given = _registry().parse_units(text)
-        return given, _registry().Quantity(1.0, given).to_base_units().units
+        given = _registry().Quantity(_registry().parse_expression(expression))
+        factor *= float(given.magnitude)
+        return factor, given.units, _registry().Quantity(1.0, given.units).to_base_units().units
     except Exception as error:  # on malformed text pint's parser fails in many ways, assertions among them
         raise UnknownUnit(unit) from error
 
 
+def _expression(unit: str) -> tuple[float, str]:
+    """A unit text as a factor before an expression of pint's own names."""
+    text = unit.translate(_LIKE).strip().rstrip(".")
+    if text.lower() in PHRASES:
+        return 1.0, PHRASES[text.lower()]
+    # N.m and m.s-1 are products, deg_per_s and m per s quotients
+    text = re.sub(r"(?<=[^\W_])\.(?=[^\W\d_])", "*", text)
+    text = re.sub(r"(?<=[^\W_])(?:_per_|\s+per\s+)(?=[^\W_])", "/", text)
+    first = re.match(rf"(?P<number>{_NUMBER})(?=$|[\s*/])\s*\*?", text)
+    factor, text = (float(first["number"]), text[first.end() :]) if first else (1.0, text)
+    if not factor:
+        raise UnknownUnit(unit)
+    parts: list[str] = []
+    at = 0
+    while at < len(text):
+        if not (token := _TOKEN.match(text, at)):
+            raise UnknownUnit(unit)
+        at = token.end()
+        parts += _part(unit, token, parts[-1] if parts else "1" if first and token["sign"] == "/" else "")
+    whole = "".join(parts)
+    if len(parts) > 1:  # in a product or quotient a temperature is a difference
+        whole = whole.replace("degree_", "delta_degree_")
+    return factor, (f"1{whole}" if whole.startswith("/") else whole) or "dimensionless"
+
+
+def _part(unit: str, token: re.Match[str], before: str) -> list[str]:
+    """A token of the text `unit` as parts of an expression, behind the part `before`."""
+    sign = token["sign"]
+    if sign in ("*", "/", ")", "-"):
+        return ["*" if sign == "-" else sign]
+    product = ["*"] if before and before not in "*/(" else []
+    if sign:
+        return [*product, sign]
+    name = token["name"]
+    if not (found := unit_name(name)):
+        raise UnknownUnit(unit, AMBIGUOUS.get(name, ""))
+    return [*product, f"({found})" + (f"**{int(token['power'])}" if token["power"] else "")]
+
+
 @functools.cache
 def _pretty() -> dict[Any, str]:
-    return {_units(name)[1]: name for name in _PRETTY}
+    return {_units(name)[2]: name for name in _PRETTY}

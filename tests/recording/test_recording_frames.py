@@ -76,8 +76,8 @@ def test_bad_frame_is_refused_like_a_bad_file(frame, message):
 
 
 def test_columns_that_nobody_asks_for_are_left_alone():
-    samples = {"t": [0.0, 1.0], "r[deg/s]": [0.0, 180.0], "label": ["a", None], "mode[enum]": [1, 2]}
-    made = from_pandas(pandas.DataFrame(samples | {"k[1]": [0.1, 0.2], "z": [1.0, 2.0]}), "dive")
+    samples = {"t": [0.0, 1.0], "r[deg/s]": [0.0, 180.0], "label": ["a", None], "mode[NTU]": [1, 2]}
+    made = from_pandas(pandas.DataFrame(samples | {"k[-]": [0.1, 0.2], "z": [1.0, 2.0]}), "dive")
     assert set(made.columns) == {"r", "k", "z"}
     assert set(made.unusable) == {"label", "mode"}
     assert made.units == {"r": "rad/s", "k": "1"}
