@@ -68,6 +68,28 @@ def identify(
 @app.command()
 @_vehicle
 @_runs
+@_out()
+@click.option("--hold-out", type=_PATH, multiple=True, help="A run to judge by and not to fit; repeatable.")
+@_columns
+@_overwrite
+@common
+def check(
+    vehicle: Path,
+    runs: tuple[Path, ...],
+    hold_out: tuple[Path, ...],
+    out: Path | None,
+    columns: Path | None,
+    overwrite: bool,
+) -> None:
+    """Say what is wrong or odd with the runs, before any fit."""
+    from . import check as command
+
+    command.run(vehicle, runs, hold_out, out, overwrite, columns)
+
+
+@app.command()
+@_vehicle
+@_runs
 @_out(required=True)
 @click.option("--hold-out", type=_PATH, multiple=True, help="A run to judge by and not to fit; repeatable.")
 @click.option("--effects", type=_PATH, help="A Python script with effects of your own, to be tried too.")

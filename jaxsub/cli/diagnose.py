@@ -17,7 +17,7 @@ from ..report import write_report
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
 from . import session, terminal
 from .output import fresh_folder, refuse_existing
-from .runs import load_runs
+from .runs import load_train_and_test
 
 _NEXT = "next_manoeuvre.csv"
 
@@ -41,8 +41,8 @@ def run(
     refuse_existing(out, overwrite)
     own = () if script is None else from_script(script)
     vehicle = read_vehicle(vehicle_path, own)
-    recordings = load_runs(runs, vehicle, columns)
-    train, judged = (recordings, load_runs(held, vehicle, columns)) if held else hold_out(recordings)
+    recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
+    train, judged = (recordings, unseen) if held else hold_out(recordings)
     with fresh_folder(out, overwrite) as folder:
         diagnosis = write_diagnosis(vehicle, train, judged, folder, (*vocabulary(), *own), manoeuvre)
     terminal.emit(diagnosis.to_json(), lambda: show(diagnosis, out))

@@ -1,29 +1,69 @@
 """Recordings as commands take them: read, checked, and their findings printed."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..checks import check
+from ..errors import InputError
+from ..findings import Finding, require_none
 from ..recording import Recording, load, read_selection
 from ..vehicle import AbstractVehicle
 from . import terminal
 
 
 def load_runs(paths: Sequence[Path], vehicle: AbstractVehicle, columns: Path | None = None) -> list[Recording]:
-    """The recordings at `paths`, refused at once where a column that `vehicle` needs is absent or has a gap.
+    """The recordings at `paths` as they will be used: see `load_train_and_test`."""
+    return load_train_and_test(paths, (), vehicle, columns)[0]
 
-    Of logs the file at `columns` says what to take.
+
+def load_train_and_test(
+    paths: Sequence[Path], held_out: Sequence[Path], vehicle: AbstractVehicle, columns: Path | None = None
+) -> tuple[list[Recording], list[Recording]]:
+    """The recordings at `paths` and those at `held_out`, masked, unwrapped and cut as `check` says.
+
+    Of logs the file at `columns` says what to take. Warnings and notes are printed. Raises InputError for the first
+    finding that is an error, and for a file that is given twice.
     """
-    recordings = [load_run(path, vehicle, columns) for path in paths]
-    layout = vehicle.layout
-    for recording in recordings:
-        recording.inputs([*layout.held, *layout.interpolated])
-        for channel in layout.channels:
-            recording.column(channel)
-        terminal.warn(recording.findings)
-    return recordings
+    require_once(paths, held_out)
+    read = lambda group: [load_run(path, vehicle, columns) for path in group]
+    checked = check(vehicle, read(paths), read(held_out))
+    require_none(checked.findings)
+    terminal.warn(checked.findings)
+    return list(checked.recordings), list(checked.held_out)
+
+
+def load_checked_run(path: Path, vehicle: AbstractVehicle, columns: Path | None = None) -> Recording:
+    """The recording at `path`, checked, in one piece. Raises InputError where a hole in time cuts it."""
+    checked = check(vehicle, [load_run(path, vehicle, columns)])
+    require_none(checked.findings)
+    if len(checked.recordings) > 1:
+        gap = next(finding for finding in checked.findings if finding.check == "time-gap" and finding.remedy)
+        raise InputError(gap.place, gap.what.partition(":")[0], "cut the run there and give its parts one by one")
+    terminal.warn(checked.findings)
+    return next(iter(checked.recordings))
 
 
 def load_run(path: Path, vehicle: AbstractVehicle, columns: Path | None = None) -> Recording:
     """The recording at `path`; of a log, inputs are held and prescribed motions interpolated as `vehicle` has them."""
     chosen = None if columns is None else read_selection(columns)
     return load(path, chosen, held=vehicle.layout.held, interpolated=vehicle.layout.interpolated)
+
+
+def require_once(paths: Sequence[Path], held_out: Sequence[Path] = ()) -> None:
+    """Raise InputError where two of the paths lead to one file."""
+    for finding in repeated_paths(paths, held_out):
+        raise finding.error()
+
+
+def repeated_paths(paths: Sequence[Path], held_out: Sequence[Path] = ()) -> list[Finding]:
+    """An error for each path that leads to the file of an earlier one."""
+    findings, every = [], [*paths, *held_out]
+    for index, path in enumerate(every):
+        for other, earlier in enumerate(every[:index]):
+            if path.exists() and earlier.exists() and os.path.samefile(path, earlier):
+                role = "as a run and held out" if other < len(paths) <= index else "twice"
+                what = f"is the file {earlier}" if str(earlier) != str(path) else "is one file"
+                findings.append(Finding("same-run", "error", str(path), f"{what}, given {role}", "give every run once"))
+                break
+    return findings

@@ -55,6 +55,11 @@ def warn(findings: Iterable[Finding]) -> None:
             console.print(f"warning: {finding.line()}")
 
 
+def count(findings: Iterable[Finding]) -> None:
+    """Count warnings that the result itself shows."""
+    options().warnings += sum(finding.severity == "warning" for finding in findings)
+
+
 def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """A table on standard output. Cells are never cut or wrapped, however narrow the terminal is."""
     drawn = Table(*(Column(escape(header), no_wrap=True, overflow="ignore") for header in headers))

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from .recording import Recording
-from .turns import without_jumps
+from .turns import unwrapped, unwrapped_mechanism, without_jumps
 
 
 class Runs(eqx.Module):
@@ -96,7 +96,8 @@ def stack_runs(
 ) -> Runs:
     """The batch of `recordings` with those columns as held inputs, interpolated inputs and outputs.
 
-    The turns of those that are `angles` are counted, where all recordings tell how many there are.
+    The turns of those that are `angles` are counted, where all recordings tell how many there are; of those among the
+    interpolated always, by the shorter way. A column that can only be a wrapped angle loses its jumps.
 
     **Raises** `InputError` for a column that is absent and for a gap in an input column.
     """
@@ -108,7 +109,9 @@ def stack_runs(
         t = recording.times - recording.times[0]
         dt = np.diff(t)
         table = recording.inputs([*held, *interpolated])
-        columns = [whole[name][index] if name in whole else recording.column(name) for name in channels]
+        for at, name in enumerate((*held, *interpolated)):
+            table[:, at] = _signal(recording, name, name in interpolated and name in angles)
+        columns = [whole[name][index] if name in whole else _channel(recording, name, angles) for name in channels]
         measured = np.stack(columns, axis=1)
         times.append(np.concatenate([t, t[-1] + dt[-1] * np.arange(1, length - len(t) + 1)]))
         signals.append(pad(table, table[-1]))
@@ -131,6 +134,24 @@ def stack_runs(
         tuple(name in whole for name in channels),
         substeps,
     )
+
+
+def _signal(recording: Recording, name: str, turns: bool) -> np.ndarray:
+    """An input column; one that `turns` is interpolated between samples and may not jump there."""
+    values = recording.column(name)
+    return unwrapped(values) if turns else _evident(recording, name)
+
+
+def _channel(recording: Recording, name: str, angles: Sequence[str]) -> np.ndarray:
+    """A measured column; one of the `angles` whose turns are in doubt as it was recorded."""
+    return recording.column(name) if name in angles else _evident(recording, name)
+
+
+def _evident(recording: Recording, name: str) -> np.ndarray:
+    """A column without the jumps of an angle that is wrapped, where its file does not say that it is none."""
+    values = recording.column(name)
+    found = unwrapped_mechanism(values) if recording.units.get(name, "rad") == "rad" else None
+    return values if found is None else found
 
 
 def _without_jumps(recordings: Sequence[Recording], name: str) -> list[np.ndarray]:

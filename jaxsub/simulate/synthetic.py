@@ -52,7 +52,13 @@ def synthetic(
     layout = vehicle.layout
     columns = layout.held + layout.interpolated
     driven = [_without_outputs(recording, columns, layout.channels) for recording in recordings]
-    runs = stack_runs(driven, held=layout.held, interpolated=layout.interpolated, channels=layout.channels)
+    runs = stack_runs(
+        driven,
+        held=layout.held,
+        interpolated=layout.interpolated,
+        channels=layout.channels,
+        angles=layout.angles,
+    )
     start = at_rest(vehicle, len(driven)) if start is None else start
     shown = np.asarray(measure(vehicle, runs, states(vehicle, runs, start)))
     sigma = np.array([(output.sigma or 0.0) * noise for output in layout.outputs])

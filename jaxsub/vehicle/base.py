@@ -81,8 +81,9 @@ class Layout:
 
     @property
     def angles(self) -> tuple[str, ...]:
-        """The measured channels that a whole turn leaves as they are."""
-        return tuple(channel for channel in self.channels if self.is_angle(channel))
+        """The measured channels and columns of prescribed motions that a whole turn leaves as they are."""
+        prescribed = (column for name, column in self.prescribed if self.is_angle(name))
+        return (*(channel for channel in self.channels if self.is_angle(channel)), *prescribed)
 
     def is_angle(self, channel: str) -> bool:
         """Whether a whole turn leaves a channel as it is, as it does a body's Euler angles."""

@@ -1,0 +1,112 @@
+"""All checks of runs, in the order in which one's answer is another's ground."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from ..findings import Finding
+from ..recording import Recording
+from ..vehicle import AbstractVehicle
+from .channels import Channel, channels_of
+from .duplicates import duplicates
+from .ranges import impossible, sample_interval
+from .sampling import late_start, pieces
+from .sentinels import sentinels
+from .spans import of_run
+from .turning import turning
+
+
+@dataclasses.dataclass(frozen=True)
+class Checked:
+    """What checks found in runs, and the runs as they will be used.
+
+    **Fields**
+
+    - `findings`: of all runs and of the vehicle, errors first.
+    - `recordings`, `held_out`: masked, unwrapped and cut; each has the findings of its own in `findings`.
+    """
+
+    findings: tuple[Finding, ...]
+    recordings: tuple[Recording, ...]
+    held_out: tuple[Recording, ...] = ()
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """The findings that stop a command."""
+        return tuple(finding for finding in self.findings if finding.severity == "error")
+
+
+def check(vehicle: AbstractVehicle, recordings: Sequence[Recording], held_out: Sequence[Recording] = ()) -> Checked:
+    """Look at runs before any fit: faults of clocks and sensors, and what contradicts itself or the vehicle.
+
+    Nothing is raised for what is wrong: it is in the findings. Samples that cannot be are masked, angles unwrapped, and
+    a run is cut where time has a hole while an input moved; each of these is a finding too.
+    """
+    layout = vehicle.layout
+    channels = channels_of(layout)
+    body = layout.kind == "submerged-body"
+    every = [*recordings, *held_out]
+    known = {name for recording in every for name in recording.columns}
+    mended, found = [], duplicates(recordings, held_out)
+    for recording in every:
+        parts, findings = _run(recording, channels, known, body)
+        mended.append(parts)
+        found += findings
+    order = ("error", "warning", "note")
+    ranked = sorted(found, key=lambda finding: order.index(finding.severity))
+    flat = lambda groups: tuple(part for parts in groups for part in parts)
+    count = len(recordings)
+    return Checked(tuple(ranked), flat(mended[:count]), flat(mended[count:]))
+
+
+def _run(
+    recording: Recording, channels: Sequence[Channel], known: set[str], body: bool
+) -> tuple[list[Recording], list[Finding]]:
+    """One run as it will be used, in pieces, and what was found in it."""
+    findings = list(recording.findings)
+    absent = _columns(recording, channels, known)
+    findings += absent
+    if any(finding.severity == "error" for finding in absent):
+        return [recording], findings
+    findings += sample_interval(recording)
+    columns = dict(recording.columns)
+    for channel in channels:
+        values = columns.get(channel.name, np.full(len(recording.times), np.nan))
+        for mend in (sentinels, impossible):
+            values, more = mend(recording, channel, values)
+            findings += more
+        values, more = turning(recording, channel, values, body)
+        columns[channel.name] = values
+        findings += more
+    whole = dataclasses.replace(recording, columns=columns)
+    findings += [note for channel in channels if channel.role == "measured" for note in late_start(whole, channel)]
+    parts, more = pieces(whole, [channel for channel in channels if channel.role != "measured"])
+    findings += more
+    return [dataclasses.replace(part, findings=tuple(findings)) for part in parts], findings
+
+
+def _columns(recording: Recording, channels: Sequence[Channel], known: set[str]) -> list[Finding]:
+    """An error for each column that is absent or cannot be used; a note for an output that only other runs have."""
+    findings = []
+    for channel in channels:
+        absent = channel.name not in recording.columns and channel.name not in recording.unusable
+        if absent and channel.role == "measured" and channel.name in known:
+            what = "is not in this run, but in others: all its samples are taken as missing"
+            findings.append(of_run("absent-output", "note", recording, channel.name, what))
+            continue
+        try:
+            if channel.role == "measured":
+                recording.column(channel.name)
+            else:
+                recording.inputs([channel.name])
+        except InputError as error:
+            findings.append(from_error("column", error))
+    return findings
+
+
+def from_error(check: str, error: InputError) -> Finding:
+    """A finding that says what an error says."""
+    where, what, remedy = error.parts
+    return Finding(check, "error", where, what, remedy)

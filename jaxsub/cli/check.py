@@ -1,0 +1,139 @@
+"""`jaxsub check`: what is wrong or odd with runs, before any fit."""
+
+import dataclasses
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..checks import Checked, check, from_error
+from ..checks.channels import Channel, channels_of
+from ..errors import InputError
+from ..findings import Finding
+from ..plain import to_json
+from ..recording import Recording
+from ..report import draw_checked_runs
+from ..vehicle import AbstractVehicle, read_vehicle
+from . import session, terminal
+from .output import fresh_folder, refuse_existing
+from .runs import load_run, repeated_paths
+
+
+def run(
+    vehicle_path: Path,
+    runs: Sequence[Path],
+    held_out: Sequence[Path] = (),
+    out: Path | None = None,
+    overwrite: bool = False,
+    columns: Path | None = None,
+) -> None:
+    """Print what checks find in `runs`, and write `check.json` and `figures/` into `out`, if given.
+
+    A run that cannot be read is a finding like others. Exits with 2 where one finding is an error.
+    """
+    session.start()
+    if out is not None:
+        refuse_existing(out, overwrite)
+    vehicle = read_vehicle(vehicle_path)
+    unread: list[Finding] = repeated_paths(runs, held_out)
+    read = [_read(path, vehicle, columns, unread) for path in runs]
+    unseen = [_read(path, vehicle, columns, unread) for path in held_out]
+    recordings, held = [r for r in read if r], [r for r in unseen if r]
+    checked = check(vehicle, recordings, held)
+    # a file given twice is one finding, not also the equal samples that follow from it
+    known = {finding.where for finding in unread}
+    later = [finding for finding in checked.findings if finding.check != "same-run" or finding.where not in known]
+    checked = dataclasses.replace(checked, findings=(*unread, *later))
+    content = _content(vehicle, checked)
+    if out is not None:
+        with fresh_folder(out, overwrite) as folder, terminal.progress("drawing"):
+            _write(vehicle, [*recordings, *held], checked, content, folder)
+    terminal.emit(content, lambda: _show(vehicle, checked))
+    terminal.count(checked.findings)
+    if checked.errors:
+        sys.exit(2)
+
+
+def _read(path: Path, vehicle: AbstractVehicle, columns: Path | None, unread: list[Finding]) -> Recording | None:
+    try:
+        return load_run(path, vehicle, columns)
+    except InputError as error:
+        unread.append(from_error("file", error))
+        return None
+
+
+def _content(vehicle: AbstractVehicle, checked: Checked) -> dict[str, Any]:
+    every = [*checked.recordings, *checked.held_out]
+    channels = [
+        {"run": recording.source, "channel": channel.name, "role": channel.role, **_numbers(recording, channel)}
+        for recording in every
+        for channel in channels_of(vehicle.layout)
+        if channel.name in recording.columns
+    ]
+    return {
+        "schema": 1,
+        "vehicle": vehicle.layout.name,
+        "errors": len(checked.errors),
+        "warnings": sum(finding.severity == "warning" for finding in checked.findings),
+        "findings": [finding.to_json() for finding in checked.findings],
+        "channels": channels,
+    }
+
+
+def _numbers(recording: Recording, channel: Channel) -> dict[str, Any]:
+    values = recording.columns[channel.name]
+    there = values[np.isfinite(values)]
+    return {
+        "unit": channel.unit,
+        "samples": int(there.size),
+        "missing": int(values.size - there.size),
+        "least": float(there.min()) if there.size else None,
+        "largest": float(there.max()) if there.size else None,
+    }
+
+
+def _write(
+    vehicle: AbstractVehicle, recordings: Sequence[Recording], checked: Checked, content: dict[str, Any], folder: Path
+) -> None:
+    (folder / "check.json").write_text(to_json(content), encoding="utf-8")
+    (folder / "figures").mkdir()
+    channels = [(channel.name, channel.unit) for channel in channels_of(vehicle.layout)]
+    for picture in draw_checked_runs(recordings, channels, checked.findings):
+        (folder / "figures" / f"{picture.name}.png").write_bytes(picture.png)
+
+
+def _show(vehicle: AbstractVehicle, checked: Checked) -> None:
+    rows = []
+    for recording in (*checked.recordings, *checked.held_out):
+        for channel in channels_of(vehicle.layout):
+            if channel.name not in recording.columns:
+                continue
+            told = _numbers(recording, channel)
+            span = f"{told['least']:.4g} to {told['largest']:.4g}" if told["samples"] else "none"
+            found = {f.check for f in checked.findings if f.where == recording.source and f.channel == channel.name}
+            counts = (str(told["samples"]), str(told["missing"]))
+            rows.append(
+                (recording.name, channel.name, channel.role, *counts, span, channel.unit, ", ".join(sorted(found)))
+            )
+    if rows:
+        terminal.table(("run", "channel", "role", "samples", "missing", "range", "unit", "found"), rows)
+    listed = [_row(finding) for finding in checked.findings]
+    if listed:
+        terminal.table(("severity", "check", "where", "channel", "rows", "times (s)", "what"), listed)
+    errors, total = len(checked.errors), len(checked.findings)
+    warnings = sum(finding.severity == "warning" for finding in checked.findings)
+    terminal.say(f"{errors} errors, {warnings} warnings, {total - errors - warnings} notes")
+
+
+def _row(finding: Finding) -> tuple[str, ...]:
+    text = f"{finding.what}{f'; {finding.remedy}' if finding.remedy else ''}"
+    spans = (_spans(finding.rows), _spans(finding.times))
+    return (finding.severity, finding.check, finding.where, finding.channel, *spans, " ".join(text.split()))
+
+
+def _spans(pairs: Sequence[tuple[float, float]]) -> str:
+    shown = [f"{a:.7g}" if a == b else f"{a:.7g} to {b:.7g}" for a, b in pairs[:3]]
+    more = [f"{len(pairs) - 3} more"] if len(pairs) > 3 else []
+    return ", ".join([*shown, *more])
