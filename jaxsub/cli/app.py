@@ -13,6 +13,7 @@ from .options import common
 _PATH = click.Path(path_type=Path)
 # said here and not asked of `estimate`, so that `--help` needs no jax; a test holds the two together
 METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
+STARTS = ("rest", "recorded", "estimated")
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
 _columns = click.option("--columns", type=_PATH, help="A TOML file that says which channels of a log to take.")
@@ -117,14 +118,15 @@ def diagnose(
 @_vehicle
 @click.argument("run", type=_PATH)
 @_out(required=True)
+@click.option("--start", type=click.Choice(STARTS), default=STARTS[-1], show_default=True, help="The initial state.")
 @_columns
 @_overwrite
 @common
-def simulate(vehicle: Path, run: Path, out: Path, columns: Path | None, overwrite: bool) -> None:
-    """Write the model's answer to a recording's inputs, as a recording."""
+def simulate(vehicle: Path, run: Path, out: Path, start: str, columns: Path | None, overwrite: bool) -> None:
+    """Write the model's answer to a recording's inputs, as a recording, and show its errors."""
     from . import simulate as command
 
-    command.run(vehicle, run, out, overwrite, columns)
+    command.run(vehicle, run, out, overwrite, columns, start)
 
 
 @app.command()

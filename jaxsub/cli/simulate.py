@@ -1,39 +1,159 @@
-"""`jaxsub simulate`: the model's answer to a recording's inputs."""
+"""`jaxsub simulate`: the model's answer to a recording's inputs, and how far it is from what was measured."""
 
 from pathlib import Path
+from typing import Any, Literal
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from ..discrepancy import batch
 from ..errors import InputError
-from ..estimate import initial_guess, predict
+from ..estimate import channel_rms, initial_guess, predict, rest, search, state_channels
+from ..findings import Finding
+from ..likelihood import residual_outputs
 from ..recording import Recording, save
-from ..vehicle import read_vehicle
+from ..recording.runs import Runs
+from ..report.text import unit
+from ..results import RESULTS
+from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
 from .output import refuse_existing
 from .runs import load_run
 
+Start = Literal["rest", "recorded", "estimated"]
 
-def run(vehicle_path: Path, run_path: Path, out: Path, overwrite: bool, columns: Path | None = None) -> None:
-    """Write the recording's inputs and the model's outputs to `out`.
 
-    The model starts from the first measured samples where the recording has them, else at rest at operating speed. Of a
-    log, the file at `columns` says what to take.
+def run(
+    vehicle_path: Path,
+    run_path: Path,
+    out: Path,
+    overwrite: bool,
+    columns: Path | None = None,
+    start: Start = "estimated",
+) -> None:
+    """Write the recording's inputs and the model's outputs to `out`, and show their errors where they were measured.
+
+    The model starts at rest, from the recorded first samples, or from the initial state that the whole recording makes
+    most probable, as `diagnose` and `identify` estimate it. Of a log, the file at `columns` says what to take.
     """
     session.start()
     refuse_existing(out, overwrite)
     vehicle = read_vehicle(vehicle_path)
     recording = load_run(run_path, vehicle, columns)
-    missing = {c: np.full(len(recording.times), np.nan) for c in vehicle.layout.channels if c not in recording.columns}
-    given = Recording(recording.name, recording.times, recording.columns | missing, recording.source)
+    terminal.warn(recording.findings)
+    given = with_every_channel(recording, vehicle)
     with terminal.progress(f"simulating {vehicle.layout.name}"):
         runs = batch(vehicle, [given])
-        start, _ = initial_guess(vehicle, runs)
-        shown = np.asarray(predict(vehicle, runs, jnp.asarray(start)))[0]
-    if not np.all(np.isfinite(shown)):
+        began, state, findings = initial_state(vehicle, runs, recording, start)
+        shown = predict(vehicle, runs, state[None])
+    if not np.all(np.isfinite(np.asarray(shown))):
         raise InputError(str(vehicle_path), "the model diverges on these inputs", "check the coefficients' signs")
+    terminal.warn(findings)
+    fit = errors(vehicle, runs, shown)
+    content = {
+        "schema": 1,
+        "vehicle": vehicle.layout.name,
+        "run": recording.source,
+        "out": out,
+        "start": began,
+        "initial_state": dict(zip(vehicle.layout.states, state, strict=True)),
+        "fit": fit,
+        "findings": [finding.to_json() for finding in (*recording.findings, *findings)],
+    }
+    terminal.emit(content, lambda: show(began, content["initial_state"], fit))
+    save(answer(vehicle, recording, np.asarray(shown)[0], out), out)
+
+
+def with_every_channel(recording: Recording, vehicle: AbstractVehicle) -> Recording:
+    """The recording with the vehicle's channels that it lacks as columns of missing samples.
+
+    **Raises** `InputError` for a channel that it has and that cannot be used.
+    """
+    channels = vehicle.layout.channels
+    absent = [c for c in channels if c not in recording.columns and c not in recording.unusable]
+    table = {c: recording.column(c) for c in channels if c not in absent}
+    nothing = np.full(len(recording.times), np.nan)
+    columns = recording.columns | table | dict.fromkeys(absent, nothing)
+    return Recording(recording.name, recording.times, columns, recording.source, recording.first_row)
+
+
+def initial_state(
+    vehicle: AbstractVehicle, runs: Runs, recording: Recording, start: Start
+) -> tuple[Start, Float[Array, " s"], list[Finding]]:
+    """How the one run starts, its initial state in SI units, and what is to be said of it.
+
+    Where nothing is measured the model starts at rest. **Raises** `InputError` for a recorded start of which a sensor's
+    first sample is later than the longest interval between its samples, or an estimated one with which it diverges.
+    """
+    where = recording.source
+    if start != "rest" and not np.any(np.asarray(runs.mask)):
+        what = f"has no sample of {', '.join(vehicle.layout.channels)}; the model starts at rest"
+        return "rest", rest(vehicle, 1)[0], [Finding("initial-state", "note", where, what)]
+    if start == "rest":
+        return start, rest(vehicle, 1)[0], []
+    if start == "recorded":
+        _require_prompt(vehicle, runs, where)
+        return start, initial_guess(vehicle, runs)[0][0], []
+    found = search(vehicle, runs, moving=False)
+    if not bool(jnp.isfinite(found.cost)):
+        raise InputError(where, "the model diverges from every initial state tried", "check the coefficients' signs")
+    if bool(found.result == RESULTS.successful):
+        return start, found.start[0], []
+    what = f"the search for the initial state did not converge: {RESULTS[found.result]}"
+    return start, found.start[0], [Finding("initial-state", "warning", where, what, "try --start recorded")]
+
+
+def _require_prompt(vehicle: AbstractVehicle, runs: Runs, where: str) -> None:
+    for channel in state_channels(vehicle.layout).values():
+        times = np.asarray(runs.times)[0, np.asarray(runs.mask)[0, :, vehicle.layout.channels.index(channel)]]
+        longest = np.max(np.diff(times), initial=0.0)
+        if len(times) and times[0] > longest:
+            what = f"{channel} has its first sample at {times[0]:.4g} s, later than its longest gap, {longest:.4g} s"
+            raise InputError(where, what, "give --start estimated, or cut the run there")
+
+
+def errors(vehicle: AbstractVehicle, runs: Runs, shown: Float[Array, "1 k c"]) -> dict[str, dict[str, Any]]:
+    """By measured channel its samples, unit, rms error in SI units, the file's σ and rms/σ, where σ is stated."""
     layout = vehicle.layout
-    answer = {name: recording.column(name) for name in (*layout.held, *layout.interpolated)}
-    answer |= dict(zip(layout.channels, shown.T, strict=True))
-    save(Recording(out.stem, recording.times, answer, str(out)), out)
+    rms = channel_rms(residual_outputs(vehicle, runs, shown), runs, layout.channels)
+    counts = dict(zip(layout.channels, np.asarray(runs.samples()).tolist(), strict=True))
+    return {
+        one.channel: {
+            "samples": counts[one.channel],
+            "unit": layout.unit(one.channel),
+            "rms": rms[one.channel],
+            "sigma": one.sigma,
+            "rms_over_sigma": None if one.sigma is None else rms[one.channel] / one.sigma,
+        }
+        for one in layout.outputs
+        if counts[one.channel]
+    }
+
+
+def answer(vehicle: AbstractVehicle, recording: Recording, shown: Float[np.ndarray, "k c"], out: Path) -> Recording:
+    """The recording's inputs with the model's outputs."""
+    layout = vehicle.layout
+    table = {name: recording.column(name) for name in (*layout.held, *layout.interpolated)}
+    table |= dict(zip(layout.channels, shown.T, strict=True))
+    return Recording(out.stem, recording.times, table, str(out))
+
+
+_SAID: dict[Start, str] = {
+    "rest": "The model starts at rest",
+    "recorded": "The model starts from the first samples, and at rest where nothing is measured",
+    "estimated": "The model starts from the initial state estimated from the whole recording",
+}
+
+
+def show(began: Start, state: dict[str, Any], fit: dict[str, dict[str, Any]]) -> None:
+    """The initial state and the table of errors on standard output."""
+    terminal.say(f"{_SAID[began]}: {', '.join(f'{name} {float(value):.4g}' for name, value in state.items())} (SI).")
+    if not fit:
+        return
+    rows = []
+    for channel, one in fit.items():
+        stated = one["sigma"] is not None
+        over = (f"{one['sigma']:.4g}", f"{one['rms_over_sigma']:.2f}") if stated else ("not stated", "")
+        rows.append((channel, str(one["samples"]), f"{one['rms']:.4g}", unit(one["unit"]), *over))
+    terminal.table(("channel", "samples", "rms error", "unit", "σ", "rms/σ"), rows)

@@ -6,10 +6,11 @@ from .disturbance import estimate_disturbance
 from .ends import Ends, ends
 from .filtered import Filtered
 from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
+from .initial_states import initial_guess, rest, state_channels
 from .method import AbstractMethod, Found, Iterative, share_for, shares_at_once
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .posterior import posterior
-from .problem import Expansion, Problem, initial_guess, require_free
+from .problem import Expansion, Problem, require_free
 from .starts import MARGIN, Basin, Rate, basins, scattered, scattered_by_number, success
 
 __all__ = [
@@ -52,10 +53,12 @@ __all__ = [
     "posterior",
     "predict",
     "require_free",
+    "rest",
     "scattered",
     "scattered_by_number",
     "search",
     "share_for",
     "shares_at_once",
+    "state_channels",
     "success",
 ]

@@ -10,21 +10,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..effects import CHANNEL_UNITS
 from ..errors import InputError
 from ..likelihood import errors
 from ..likelihood.march import March
 from ..parameters import Transform
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
-from ..vehicle.base import memory_states
 from .curvature import Arrow
+from .initial_states import initial_guess
 from .newton import second_order
 
-# how far an initial state that nothing measures may lie from rest: m/s, rad/s, rad, m
-_SPREAD = {"m/s": 1.0, "rad/s": 0.5, "rad": 0.5, "m": 10.0}
-# of what an effect remembers, which starts at zero
-_MEMORY = 0.1
 # how far from the origin two points show which numbers the parameters move
 _NEAR = 0.1
 
@@ -225,41 +220,3 @@ def _prior(problem: Problem, y: Array) -> Float[Array, " d"]:
     p = len(problem.prior_mean)
     theta = problem.transform.to_physical(y[:p])
     return jnp.concatenate([(theta - problem.prior_mean) / problem.prior_std, y[p:]])
-
-
-def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r s"], Float[Array, " s"]]:
-    """Initial states from the first measured sample of each state's channel, else rest at the operating speed."""
-    layout = vehicle.layout
-    body, names = layout.kind == "submerged-body", layout.states
-    aliases = {"z": ("z", "depth")}
-    mask, outputs = np.asarray(runs.mask), np.asarray(runs.outputs)
-    guess = np.zeros((runs.times.shape[0], len(names)))
-    spread = np.ones(len(names))
-    kept = memory_states(vehicle.effects)
-    for i, name in enumerate(names):
-        spread[i] = _MEMORY if name in kept else _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
-        channel = next((c for c in aliases.get(name, (name,)) if c in layout.channels), None)
-        if channel is None:
-            guess[:, i] = float(vehicle.own_values()["speed"]) if body and name == "u" else 0.0
-            if (coordinate := name.removesuffix("_rate")) in layout.channels:
-                spread[i] = max(spread[i], _fastest(runs, layout.channels.index(coordinate)))
-            continue
-        column = layout.channels.index(channel)
-        for run in range(len(guess)):
-            seen = np.flatnonzero(mask[run, :, column])
-            guess[run, i] = outputs[run, seen[0], column] if len(seen) else 0.0
-        # wide enough that the prior weighs nothing against the channel's own first samples
-        spread[i] = max(spread[i], _std(outputs[..., column][mask[..., column]]))
-    return jnp.asarray(guess), jnp.asarray(spread)
-
-
-def _fastest(runs: Runs, column: int) -> float:
-    """The largest rate of a channel between two samples that follow each other."""
-    steps, mask = np.asarray(runs.steps)[np.asarray(runs.step_of)], np.asarray(runs.mask)[..., column]
-    there = np.asarray(runs.live) & mask[:, 1:] & mask[:, :-1]
-    change = np.diff(np.asarray(runs.outputs)[..., column])
-    return float(np.max(np.abs(change[there]) / steps[there], initial=0.0))
-
-
-def _std(samples: np.ndarray) -> float:
-    return float(np.std(samples)) if len(samples) else 0.0

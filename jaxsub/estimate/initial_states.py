@@ -1,0 +1,84 @@
+"""Initial states of runs: at rest, or from the first samples, with how far they may be from there."""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..effects import CHANNEL_UNITS
+from ..recording.runs import Runs
+from ..vehicle import AbstractVehicle, Layout
+from ..vehicle.base import memory_states
+
+# how far an initial state that nothing measures may lie from rest: m/s, rad/s, rad, m
+_SPREAD = {"m/s": 1.0, "rad/s": 0.5, "rad": 0.5, "m": 10.0}
+# of what an effect remembers, which starts at zero
+_MEMORY = 0.1
+# channels other than its own name that measure a state
+_ALIASES = {"z": ("z", "depth")}
+
+
+def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r s"], Float[Array, " s"]]:
+    """Initial states from the first sample of each state's channel, else at rest; and their standard deviations.
+
+    A sensor that starts late measures a state that may have changed since the run began: the standard deviation is then
+    at least the rms change of its channel over so long a time.
+    """
+    layout, measured = vehicle.layout, state_channels(vehicle.layout)
+    kept = memory_states(vehicle.effects)
+    mask, outputs, times = np.asarray(runs.mask), np.asarray(runs.outputs), np.asarray(runs.times)
+    guess = np.array(rest(vehicle, len(times)))
+    spread = np.ones(len(layout.states))
+    for i, name in enumerate(layout.states):
+        spread[i] = _MEMORY if name in kept else _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
+        if name not in measured:
+            if (coordinate := name.removesuffix("_rate")) in layout.channels:
+                spread[i] = max(spread[i], _fastest(runs, layout.channels.index(coordinate)))
+            continue
+        column = layout.channels.index(measured[name])
+        # wide enough that the prior weighs nothing against the channel's own first samples
+        spread[i] = max(spread[i], _std(outputs[..., column][mask[..., column]]))
+        for run, there in enumerate(mask[..., column]):
+            if there.any():
+                guess[run, i] = outputs[run, there, column][0]
+                spread[i] = max(spread[i], _change(times[run, there], outputs[run, there, column]))
+    return jnp.asarray(guess), jnp.asarray(spread)
+
+
+def rest(vehicle: AbstractVehicle, count: int) -> Float[Array, "r s"]:
+    """`count` initial states at the origin and at rest; a body that surges does so at its operating speed."""
+    layout = vehicle.layout
+    surges = layout.kind == "submerged-body" and "u" in layout.states
+    speed = float(vehicle.own_values()["speed"]) if surges else 0.0
+    state = [speed if surges and name == "u" else 0.0 for name in layout.states]
+    return jnp.broadcast_to(jnp.asarray(state), (count, len(state)))
+
+
+def state_channels(layout: Layout) -> dict[str, str]:
+    """By state the channel that measures it, of those states that have one."""
+    among = {name: [c for c in _ALIASES.get(name, (name,)) if c in layout.channels] for name in layout.states}
+    return {name: channels[0] for name, channels in among.items() if channels}
+
+
+def _fastest(runs: Runs, column: int) -> float:
+    """The largest rate of a channel between two samples that follow each other."""
+    steps, mask = np.asarray(runs.steps)[np.asarray(runs.step_of)], np.asarray(runs.mask)[..., column]
+    there = np.asarray(runs.live) & mask[:, 1:] & mask[:, :-1]
+    change = np.diff(np.asarray(runs.outputs)[..., column])
+    return float(np.max(np.abs(change[there]) / steps[there], initial=0.0))
+
+
+def _change(times: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> float:
+    """The rms change of a signal over as long a time as passes from 0 s to its first sample.
+
+    Where it was measured for less than twice that time, in proportion from the change over half of what there is.
+    """
+    if len(times) < 2 or times[0] == 0.0:
+        return 0.0
+    over = min(times[0], 0.5 * (times[-1] - times[0]))
+    begins = times[times <= times[-1] - over]
+    change = np.interp(begins + over, times, values) - values[: len(begins)]
+    return float(np.sqrt(np.mean(change**2)) * times[0] / over)
+
+
+def _std(samples: np.ndarray) -> float:
+    return float(np.std(samples)) if len(samples) else 0.0
