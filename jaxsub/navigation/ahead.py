@@ -99,9 +99,10 @@ def _by_c(call: Compiled, state: Packed, seen: Packed) -> Compiled:
     from ..symbolic import casadi_function, compiled
 
     program = compiled(casadi_function(call, state, seen, name="step"))
-    (state_in, seen_in), (state_out, found) = program.given, program.found
 
     def run(state: Packed, seen: Packed) -> tuple[Packed, Packed]:
+        # of the thread that calls
+        (state_in, seen_in), (state_out, found) = program.given, program.found
         state_in[:], seen_in[:] = state[0], seen[0]
         program()
         return (state_out.copy(),), (found.copy(),)

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 
 import jax.numpy as jnp
 import numpy as np
@@ -55,3 +56,22 @@ def test_a_missing_compiler_is_one_clear_line(monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(InputError, match=r"no-such-compiler: no C compiler of this name; install one"):
         compiled(casadi_function(jnp.sin, jnp.zeros(1)))
+
+
+def test_threads_on_one_object_do_not_see_each_others_numbers():
+    """Arrays large enough that calls overlap: the lock of the interpreter is released in each."""
+    size = 400
+    native = compiled(casadi_function(lambda x: jnp.cumsum(jnp.sin(x)), jnp.zeros(size), name="summed"))
+
+    def answers(seed):
+        rng, found = np.random.default_rng(seed), []
+        for _ in range(300):
+            native.given[0][:] = rng.normal(size=size)
+            native()
+            found.append(native.found[0].copy())
+        return np.array(found)
+
+    serial = [answers(seed) for seed in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        for found, expected in zip(pool.map(answers, range(4)), serial, strict=True):
+            np.testing.assert_array_equal(found, expected)
