@@ -1,23 +1,28 @@
-"""Recordings as CSV, Parquet and NetCDF files whose headers are `name` (SI) or `name[unit]`."""
+"""Recordings as files whose headers are `name` (SI) or `name[unit]`: CSV and its like, Parquet, NetCDF and more."""
 
-import csv
 import os
 import tempfile
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
-
-import h5py
-import numpy as np
-import xarray
-from pyarrow import parquet
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path, PurePosixPath
+from typing import TypeVar
 
 from jaxsub.errors import InputError
-from jaxsub.recording.frames import Table, recorded, to_pandas, to_xarray, variables
+from jaxsub.recording.archive import MARK, extracted, split_member
+from jaxsub.recording.frames import recorded, to_pandas, to_xarray
+from jaxsub.recording.layout import with_brackets
 from jaxsub.recording.logs import SUFFIXES, Selection, load_log
-from jaxsub.recording.recording import FIRST_ROW, Recording
+from jaxsub.recording.matlab import read_matlab
+from jaxsub.recording.netcdf import read_netcdf
+from jaxsub.recording.parquet import read_parquet
+from jaxsub.recording.reading import Contents, require_file
+from jaxsub.recording.recording import Recording
+from jaxsub.recording.text import read_text
+from jaxsub.recording.workbook import read_workbook
 
+T = TypeVar("T")
 Units = Mapping[str, str]
+Reader = Callable[[Path, str], Contents]
+Writer = Callable[[Path, Recording, Units], None]
 
 
 def load(
@@ -27,23 +32,36 @@ def load(
     held: Collection[str] = (),
     interpolated: Collection[str] = (),
 ) -> Recording:
-    """Read a .csv, .parquet or .nc file, or `columns` of a vehicle's log; the run is named after it.
+    """Read a file with a recording, or `columns` of a vehicle's log; the run is named after it.
 
-    The rest is for logs alone and handed to `load_log`. Raises InputError, naming the file and where it applies the row
-    and column, whatever the file holds.
+    The file is .csv, .tsv or .txt, .parquet, .nc, .mat, .xlsx, or a .zip of one of these, `runs.zip!dive.csv` where it
+    holds several. How it was read stands in the run's findings, where that is not plain. The rest is for logs alone and
+    handed to `load_log`. Raises InputError, naming the file and where it applies the row and column, whatever the file
+    holds.
     """
     path = Path(path)
-    if path.suffix.lower() in SUFFIXES or (path / "metadata.yaml").is_file():
+    if path.suffix.lower() in SUFFIXES or _is_bag(path):
         if columns is None:
             what = "is a log of many channels"
             raise InputError(str(path), what, f"say which to take by --columns; `jaxsub channels {path}` lists them")
         return load_log(path, columns, held=held, interpolated=interpolated)
-    read, _ = _format(path)
-    if not path.is_file():
-        raise InputError(str(path), "is a folder" if path.is_dir() else "no such file", "give the path of a recording")
     if columns is not None:
         raise InputError(str(path), "is no log: its headers name its columns", "leave --columns out")
-    return recorded(read(path), path.stem, str(path))
+    contents, name, source = read(path)
+    return recorded(contents.table, name, source, contents.first_row, contents.findings)
+
+
+def read(path: Path) -> tuple[Contents, str, str]:
+    """What the file of a recording holds, the run's name and the file as errors name it."""
+    file, member = split_member(path)
+    if file.suffix.lower() == ARCHIVE:
+        with extracted(file, member, _READERS) as (target, found):
+            source = f"{file}{MARK}{found}"
+            contents = _of_suffix(_READERS, target, source)(target, source)
+            return contents, PurePosixPath(found).stem if member else file.stem, source
+    reader = _of_suffix(_READERS, path, str(path))
+    require_file(path)
+    return reader(path, str(path)), path.stem, str(path)
 
 
 def save(recording: Recording, path: str | os.PathLike[str], units: Units | None = None) -> None:
@@ -53,7 +71,7 @@ def save(recording: Recording, path: str | os.PathLike[str], units: Units | None
     column name that the format cannot hold, and a path that cannot be written.
     """
     path = Path(path)
-    _, write = _format(path)
+    write = _of_suffix(_WRITERS, path, str(path))
     recording.in_units(units or {})  # refuses a wrong unit before anything is written
     try:
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".jaxsub-") as folder:
@@ -63,66 +81,44 @@ def save(recording: Recording, path: str | os.PathLike[str], units: Units | None
         raise InputError(str(path), f"cannot be written ({error.strerror or error})", "check its folder") from error
 
 
-def _format(path: Path) -> tuple[Callable[[Path], Table], Callable[[Path, Recording, Units], None]]:
-    if found := _FORMATS.get(path.suffix.lower()):
+def _of_suffix(known: Mapping[str, T], path: Path, source: str) -> T:
+    if found := known.get(path.suffix.lower()):
         return found
-    raise InputError(str(path), f"unknown extension {path.suffix!r}", f"use {', '.join(_FORMATS)}")
+    suffixes = ", ".join([*known, ARCHIVE] if known is _READERS else known)
+    raise InputError(source.replace("\0", "\\0"), f"unknown extension {path.suffix!r}", f"use {suffixes}")
 
 
-@contextmanager
-def _reading(path: Path, form: str) -> Iterator[None]:
+def _is_bag(path: Path) -> bool:
     try:
-        yield
-    except Exception as error:  # no library promises what it raises on a damaged file
-        raise InputError(str(path), f"cannot be read ({error})", f"check that it is whole and is {form}") from error
-
-
-def _read_csv(path: Path) -> Table:
-    # Not through pandas, which pads short rows and loses the row number of a bad cell.
-    with _reading(path, "UTF-8 text"), path.open(encoding="utf-8-sig", newline="") as file:
-        rows = list(csv.reader(file))
-    while rows and not "".join(rows[-1]).strip():
-        rows.pop()
-    if not rows:
-        raise InputError(str(path), "is empty", "write a header and a row for each sample")
-    header, body = rows[0], rows[1:]
-    for row, cells in enumerate(body, FIRST_ROW):
-        if len(cells) != len(header):
-            what = f"{len(cells)} cells under {len(header)} headers"
-            raise InputError(f"{path}, row {row}", what, "give every row a cell for each header")
-    return [(name, np.array([cells[i] for cells in body], object)) for i, name in enumerate(header)]
+        return (path / "metadata.yaml").is_file()
+    except ValueError:  # a name with a NUL, in old Pythons
+        return False
 
 
 def _write_csv(path: Path, recording: Recording, units: Units) -> None:
+    for name in recording.columns:
+        if with_brackets(name) != name:
+            what = "is a name that a text file would read as one with a unit"
+            raise InputError(f"column {name!r}", what, "rename it or write a .parquet file")
     to_pandas(recording, units).to_csv(path, index=False)
-
-
-def _read_parquet(path: Path) -> Table:
-    with _reading(path, "Parquet"), parquet.ParquetFile(path) as file:
-        table = file.read()
-        columns = [column.to_numpy() for column in table.columns]
-    return list(zip(table.column_names, columns, strict=True))
 
 
 def _write_parquet(path: Path, recording: Recording, units: Units) -> None:
     to_pandas(recording, units).to_parquet(path, index=False)
 
 
-def _read_netcdf(path: Path) -> Table:
-    # h5netcdf complains on stderr as well if it fails on this attribute, so look at it first.
-    with _reading(path, "NetCDF 4"), h5py.File(path) as file:
-        file.attrs.get("_nc3_strict")
-    with _reading(path, "NetCDF 4"), xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
-        dataset = file.load()
-    return variables(dataset, str(path))
-
-
 def _write_netcdf(path: Path, recording: Recording, units: Units) -> None:
     to_xarray(recording, units).to_netcdf(path, engine="h5netcdf")
 
 
-_FORMATS = {
-    ".csv": (_read_csv, _write_csv),
-    ".parquet": (_read_parquet, _write_parquet),
-    ".nc": (_read_netcdf, _write_netcdf),
+ARCHIVE = ".zip"
+_READERS: dict[str, Reader] = {
+    ".csv": read_text,
+    ".tsv": read_text,
+    ".txt": read_text,
+    ".parquet": read_parquet,
+    ".nc": read_netcdf,
+    ".mat": read_matlab,
+    ".xlsx": read_workbook,
 }
+_WRITERS: dict[str, Writer] = {".csv": _write_csv, ".parquet": _write_parquet, ".nc": _write_netcdf}

@@ -109,7 +109,7 @@ def test_failed_save_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch):
         target.write_text("t,r\n0.0,")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setitem(files._FORMATS, ".csv", (files._read_csv, write_half))
+    monkeypatch.setitem(files._WRITERS, ".csv", write_half)
     with pytest.raises(InputError, match=r"run\.csv: cannot be written \(No space left on device\)"):
         save(make(), path)
     assert path.read_bytes() == before
