@@ -79,8 +79,12 @@ def from_si(values: np.ndarray, unit: str) -> np.ndarray:
 
 def si_unit(unit: str) -> str:
     """Return the SI unit that `to_si` converts `unit` to, for reading: `rad/s` for `rpm`. Raises UnknownUnit."""
-    *_, base = _units(unit)
-    return _pretty().get(base) or f"{base:~P}"
+    return _shown(_units(unit)[2])
+
+
+def unit_rate(unit: str) -> str:
+    """The SI unit of the rate of what has the SI unit `unit`, as `si_unit` writes it: `rad/s` for `rad`."""
+    return _shown(_units(unit)[2] / _registry().Unit("second"))
 
 
 def check_time_unit(where: str, unit: str) -> None:
@@ -114,6 +118,10 @@ def column_to_si(where: str, name: str, values: np.ndarray, unit: str) -> tuple[
         return to_si(values, unit), si_unit(unit) or "1"
     except UnknownUnit as error:
         raise InputError(where, str(error), error.remedy) from error
+
+
+def _shown(base: Any) -> str:
+    return _pretty().get(base) or f"{base:~P}"
 
 
 def _convert(values: np.ndarray, source: Any, target: Any) -> np.ndarray:

@@ -8,7 +8,7 @@ from ..checks import check
 from ..errors import InputError
 from ..findings import Finding, require_none
 from ..recording import Recording, load, read_selection
-from ..vehicle import AbstractVehicle
+from ..vehicle import AbstractVehicle, check_units
 from . import terminal
 
 
@@ -47,7 +47,9 @@ def load_checked_run(path: Path, vehicle: AbstractVehicle, columns: Path | None 
 def load_run(path: Path, vehicle: AbstractVehicle, columns: Path | None = None) -> Recording:
     """The recording at `path`; of a log, inputs are held and prescribed motions interpolated as `vehicle` has them."""
     chosen = None if columns is None else read_selection(columns)
-    return load(path, chosen, held=vehicle.layout.held, interpolated=vehicle.layout.interpolated)
+    recording = load(path, chosen, held=vehicle.layout.held, interpolated=vehicle.layout.interpolated)
+    check_units(vehicle.layout, [recording])
+    return recording
 
 
 def require_once(paths: Sequence[Path], held_out: Sequence[Path] = ()) -> None:

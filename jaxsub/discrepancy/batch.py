@@ -7,13 +7,14 @@ import numpy as np
 
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
-from ..vehicle import AbstractVehicle
+from ..vehicle import AbstractVehicle, check_units
 from .stiffness import substeps_free, substeps_of
 
 
 def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     """The recordings as the batch that `vehicle` takes, with as many integration steps a sample as it needs."""
     layout = vehicle.layout
+    check_units(layout, recordings)
     rates = np.linalg.solve(np.asarray(vehicle.mass_matrix()), np.asarray(vehicle.damping_matrix()))
     fastest = float(np.max(np.abs(np.linalg.eigvals(rates))))
     longest = max(float(np.diff(r.times).max()) for r in recordings)

@@ -3,6 +3,7 @@
 from .base import AbstractVehicle, Layout, Output
 from .build import build
 from .checks import require_inertia
+from .dimensions import check_units
 from .mechanism import Mechanism
 from .read import read_vehicle, vehicle_from
 from .submerged_body import SubmergedBody
@@ -15,6 +16,7 @@ __all__ = [
     "Output",
     "SubmergedBody",
     "build",
+    "check_units",
     "read_vehicle",
     "require_inertia",
     "vehicle_from",
