@@ -20,10 +20,10 @@ from jaxsub.control import (
     export_plant,
     linearisation_error,
     linearise,
+    load_plant,
     require_trim,
     trim,
 )
-from jaxsub.control.plant_loader import load
 from jaxsub.effects import ActuatorDelay, ActuatorLag, CrossflowDrag, Current, FluidMemory, SensorDelay
 from jaxsub.parameters import number
 from jaxsub.symbolic import Native, compiled
@@ -65,7 +65,7 @@ def _row(plant: Plant, path: Path, count: int) -> dict:
     function = casadi_plant(plant)
     linear, native = casadi_jacobians(function), compiled(function)
     export_plant(plant, path)
-    loaded = load(path)
+    loaded = load_plant(path)
     system = control_system(plant)
     now = jnp.asarray(0.0)
     ways: dict[str, Callable] = {

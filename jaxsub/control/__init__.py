@@ -4,7 +4,7 @@ from .autopilot import Autopilot, Memory
 from .bridge_casadi import casadi_jacobians, casadi_plant
 from .bridge_control import control_system, state_space
 from .closed_loop import fly
-from .export import export_plant
+from .export import export_plant, export_plant_loader, load_plant
 from .limits import FinLimits
 from .linear import LinearPlant, linearisation_error, linearise, linearise_rates
 from .mpc import Mpc, Plan, Solved
@@ -35,10 +35,12 @@ __all__ = [
     "control_system",
     "discretise",
     "export_plant",
+    "export_plant_loader",
     "fly",
     "linearisation_error",
     "linearise",
     "linearise_rates",
+    "load_plant",
     "observer",
     "pursue",
     "references",

@@ -17,6 +17,7 @@ from jaxsub.control import (
     control_system,
     discretise,
     export_plant,
+    export_plant_loader,
     linearise,
     linearise_rates,
     state_space,
@@ -92,9 +93,11 @@ for name in ("jaxsub", "equinox", "optimistix", "diffrax"):
     sys.modules[name] = None
 import jax, numpy as np
 jax.config.update("jax_enable_x64", True)
-sys.path.append({path!r})
+sys.path.append({folder!r})
 from plant_loader import load
+before = list(sys.path)
 plant = load({path!r})
+assert sys.path == before
 x, rows = plant.start, []
 for u in np.load({inputs!r}):
     rows.append(np.concatenate([x, plant.output(x, u, 0.4)]))
@@ -110,7 +113,9 @@ def test_exported_plant_runs_where_there_is_only_jax(tmp_path):
     path, inputs = tmp_path / "nps.plant", 0.1 * np.sign(np.random.default_rng(1).standard_normal((25, 3)))
     np.save(tmp_path / "inputs.npy", inputs)
     export_plant(plant, path)
-    names = {"path": str(path), "inputs": str(tmp_path / "inputs.npy"), "out": str(tmp_path / "out.npz")}
+    export_plant_loader(tmp_path / "plant_loader.py")
+    names = {"folder": str(tmp_path), "path": str(path)}
+    names |= {"inputs": str(tmp_path / "inputs.npy"), "out": str(tmp_path / "out.npz")}
     done = subprocess.run(
         [sys.executable, "-I", "-c", WITHOUT.format(**names)], capture_output=True, text=True, timeout=300
     )
