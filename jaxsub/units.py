@@ -82,6 +82,18 @@ def si_unit(unit: str) -> str:
     return _shown(_units(unit)[2])
 
 
+def is_si(unit: str) -> bool:
+    """Whether numbers in `unit` are in SI already, as those in `N/(m/s)` are. Raises UnknownUnit."""
+    factor, given, base = _units(unit)
+    at = _convert(np.array([0.0, 1.0]), given, base) * factor
+    return bool(at[0] == 0.0 and abs(at[1] - 1.0) < 1e-12)
+
+
+def same_dimension(unit: str, other: str) -> bool:
+    """Whether two units have one dimension, an angle counting as a plain number. Raises UnknownUnit."""
+    return _units(unit)[1].dimensionality == _units(other)[1].dimensionality
+
+
 def unit_rate(unit: str) -> str:
     """The SI unit of the rate of what has the SI unit `unit`, as `si_unit` writes it: `rad/s` for `rad`."""
     return _shown(_units(unit)[2] / _registry().Unit("second"))

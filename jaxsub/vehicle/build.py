@@ -1,6 +1,5 @@
 """Putting a vehicle together from named numbers."""
 
-import dataclasses
 import math
 
 import jax.numpy as jnp
@@ -9,8 +8,8 @@ from ..effects import EQUATIONS, GRAVITY, AbstractEffect
 from ..errors import InputError
 from ..parameters import Parameter, number
 from .base import Layout, Output, memory_states
-from .checks import check_coefficients, check_effects, check_names, check_outputs, require_inertia
-from .coefficient_units import ADDED, CONTROL, DAMPING, coefficient_unit
+from .checks import check_coefficients, check_coordinates, check_effects, check_names, check_outputs, require_inertia
+from .coefficient_units import ADDED, CONTROL, DAMPING
 from .control import Control
 from .damping import Damping
 from .inertia import RIGID, Inertia
@@ -59,7 +58,6 @@ def build(
     if kind == "submerged-body":
         values = _complete(values, where)
         hull = _sizes(values, hull)
-        rows = tuple(dataclasses.replace(row, unit=coefficient_unit(row.name)) for row in rows)
     rows += effect_rows
     equations = dof or EQUATIONS
     shown = tuple(output.channel for output in outputs)
@@ -130,6 +128,7 @@ def _body(values: dict, layout: Layout, effects: tuple, density: float, where: s
 
 
 def _mechanism(values: dict, layout: Layout, effects: tuple, where: str) -> Mechanism:
+    check_coordinates(layout, where)
     e, inputs = layout.equations, [name for name, _ in layout.inputs]
     known = [f"{letter}_{q}" for letter in "IDKF" for q in e] + [f"B_{q}_{a}" for q in e for a in inputs]
     known += [f"{letter}_{q}_{s}" for letter in "IDK" for q in e for s in e if q != s]

@@ -1,5 +1,6 @@
 """Refusing a vehicle that cannot be, with errors that say which of its names or numbers is at fault."""
 
+import re
 from collections.abc import Iterable
 
 import jax.numpy as jnp
@@ -14,6 +15,7 @@ from .mechanism import Mechanism
 from .schema import unknown_key
 from .submerged_body import SubmergedBody
 
+MOST_COORDINATES = 30
 ENVIRONMENT = ("density", "ballast", "temperature", "altitude")
 
 
@@ -44,6 +46,28 @@ def check_names(layout: Layout, where: str) -> None:
             raise InputError(
                 f"{where}: prescribed.{name}", f"{equation} is free", "leave it out of dof or of prescribed"
             )
+
+
+def check_coordinates(layout: Layout, where: str) -> None:
+    """Refuse coordinates of a mechanism that are too many, or whose names make one name mean two things."""
+    names = layout.equations
+    if len(names) > MOST_COORDINATES:
+        # each of the inertia, damping and stiffness matrices is put together entry by entry
+        what = f"names {len(names)} coordinates, whose matrices have {3 * len(names) ** 2} entries"
+        raise InputError(f"{where}: dof", what, f"name {MOST_COORDINATES} at most")
+    known: dict[str, str] = {}
+    for name in names:
+        if not re.fullmatch(r"\w+", name):
+            raise InputError(f"{where}: dof.{name}", "is not a word", "use letters, digits and _")
+        meanings = [(name, name), (f"{name}_rate", f"the rate of {name}")]
+        meanings += [(f"I_{name}", f"the inertia of {name}")]
+        meanings += [(f"I_{name}_{other}", f"the inertia between {name} and {other}") for other in names]
+        meanings += [(f"B_{name}_{a}", f"what {a} does on {name}") for a, _ in layout.inputs]
+        for symbol, meaning in meanings:
+            if symbol in known:
+                what = f"makes {symbol} both {known[symbol]} and {meaning}"
+                raise InputError(f"{where}: dof", what, "give the coordinates other names")
+            known[symbol] = meaning
 
 
 def check_coefficients(

@@ -1,8 +1,6 @@
 """Vehicle files in: TOML to a vehicle (formats.md)."""
 
 import dataclasses
-import math
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,23 +9,16 @@ from ..effects import EQUATIONS, AbstractEffect, SmoothForce, number_fields, opt
 from ..errors import InputError
 from ..parameters import Parameter
 from .build import BODY_KEYS, VECTORS, build
+from .coefficient_units import coefficient_unit
 from .mechanism import Mechanism
 from .schema import Table, read_number, read_option, read_outputs, read_pairs, unknown_key
 from .submerged_body import SubmergedBody
+from .toml import check_tree, read_toml
 
-_TOP = (
-    "schema",
-    "name",
-    "kind",
-    "dof",
-    "body",
-    "coefficients",
-    "inputs",
-    "prescribed",
-    "environment",
-    "outputs",
-    "effects",
-)
+_TOP = ("schema", "name", "kind", "dof", "coefficients", "inputs", "environment", "outputs", "effects")
+_OF_BODY = ("body", "prescribed")
+_SIZES = {"length": "m", "diameter": "m", "reference_density": "kg/m^3"}
+_MOST_EFFECTS = 100
 
 
 def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ()) -> SubmergedBody | Mechanism:
@@ -35,38 +26,35 @@ def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ())
 
     **Raises** `InputError` that names the file and the key for anything that is not as formats.md has it.
     """
-    path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read ({error.strerror})", "give the path of a vehicle file") from error
-    except UnicodeDecodeError as error:
-        raise InputError(str(path), "is not text", "give a vehicle file in TOML, encoded as UTF-8") from error
-    except (ValueError, RecursionError) as error:  # a number of 5000 digits and 5000 brackets are no TOMLDecodeError
-        raise InputError(str(path), f"is not TOML: {error}", "mend it at that place") from error
-    return vehicle_from(data, str(path), effects)
+    return vehicle_from(read_toml(Path(path)), str(path), effects)
 
 
 def vehicle_from(
     data: dict[str, Any], where: str, effects: Sequence[type[AbstractEffect]] = ()
 ) -> SubmergedBody | Mechanism:
     """The vehicle described by a parsed vehicle file; `where` names it in errors, `effects` are a user's own."""
+    check_tree(data, where)
     top = Table(data, where, "")
-    top.only(_TOP)
-    if top.required("schema") != 1:
-        raise InputError(f"{where}: schema", f"is {data['schema']!r}", "this version reads schema = 1")
+    if type(top.required("schema")) is not int or data["schema"] != 1:
+        raise InputError(f"{where}: schema", f"is {data['schema']!r:.60}", "this version reads schema = 1")
     kind = top.choice("kind", ("submerged-body", "mechanism"))
+    for key in _OF_BODY if kind == "mechanism" else ():
+        if key in data:
+            remedy = "delete it; a mechanism has [coefficients], and [environment] for what its effects read"
+            raise InputError(f"{where}: {key}", "is a part of a submerged body", remedy)
+    top.only((*_TOP, *_OF_BODY))
     body, extra = _read_body(top) if kind == "submerged-body" else ({}, {})
     if kind == "mechanism":
         top.required("dof")
     numbers = dict(body)
     for name, entry in top.table("coefficients").items():
-        numbers[name] = read_number(name, entry, f"{where}: coefficients.{name}", free=True)
+        unit = coefficient_unit(name) if kind == "submerged-body" else ""
+        numbers[name] = read_number(entry, f"{where}: coefficients.{name}", Parameter(name, unit))
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
     built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
     return build(
         where=where,
-        name=str(top.required("name")),
+        name=top.word("name"),
         kind=kind,
         dof=top.names("dof"),
         numbers=numbers,
@@ -91,13 +79,15 @@ def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str
             if not isinstance(entry, list) or len(entry) != 3:
                 raise InputError(place, "is not three numbers", f"give {key} = [ , , ]")
             for name, item in zip(VECTORS[key], entry, strict=True):
-                numbers[name] = read_number(name, item, place, free=False)
-        elif key in ("length", "diameter", "reference_density"):
-            hull[key] = read_number(key, entry, place, free=False)[0]
+                numbers[name] = read_number(item, f"{place} ({name})", Parameter(name, coefficient_unit(name), False))
+        elif key in _SIZES:
+            if isinstance(entry, dict) and (extra := [k for k in entry if k not in ("value", "unit")]):
+                raise InputError(f"{place}.{extra[0]}", f"{key} is not estimated", f"write {key} = …")
+            hull[key], _ = read_number(entry, place, Parameter(key, _SIZES[key], False))
             if hull[key] <= 0.0:
                 raise InputError(place, f"is {hull[key]:g}", "give a positive number")
         else:
-            numbers[key] = read_number(key, entry, place, free=False)
+            numbers[key] = read_number(entry, place, Parameter(key, coefficient_unit(key), False))
     return numbers, hull
 
 
@@ -108,6 +98,8 @@ def _read_effects(
     effects, rows = [], []
     if not isinstance(entries, list):
         raise InputError(f"{where}: effects", "is not a list of tables", "write [[effects]] above each effect")
+    if len(entries) > _MOST_EFFECTS:
+        raise InputError(f"{where}: effects", f"are {len(entries)}", f"give {_MOST_EFFECTS} at most")
     for number, entry in enumerate(entries, 1):
         table = Table(entry, where, f"effects[{number}]")
         kind = kinds[table.choice("effect", tuple(kinds))]
@@ -125,11 +117,11 @@ def _read_effects(
         given.only(tuple(symbols))
         values = {}
         for symbol, item in given.items():
-            old = table_rows[symbols[symbol]]
-            at = f"{place}.parameters.{symbol}"
-            values[symbols[symbol]], row = read_number(old.name, item, at, free=True, lower=old.lower, unit=old.unit)
-            own = {} if math.isfinite(row.prior_std) else {"prior_std": old.prior_std, "prior_mean": old.prior_mean}
-            table_rows[symbols[symbol]] = dataclasses.replace(row, **own)
+            field = symbols[symbol]
+            values[field], table_rows[field] = read_number(item, f"{place}.parameters.{symbol}", table_rows[field])
+        if table.data.get("expression", effect.expression) != effect.expression:
+            remedy = "delete the line; it says for a reader what the effect computes"
+            raise InputError(f"{place}.expression", f"is not {effect.expression!r}", remedy)
         effects.append(kind(**options(effect), **values))
         rows += list(table_rows.values())
     return tuple(effects), tuple(rows)

@@ -2,13 +2,16 @@
 
 import dataclasses
 import math
+import re
 from typing import Any
 
 from ..errors import InputError, nearest
 from ..parameters import Parameter
+from ..units import UnknownUnit, is_si, same_dimension, si_unit
 from .base import Output
 
-_NUMBER_KEYS = ("value", "fixed", "free", "bounds", "prior_std", "unit", "standard_error")
+_NUMBER_KEYS = ("value", "fixed", "free", "bounds", "prior_std", "prior_mean", "unit")
+_ACCELEROMETER = ("ax", "ay", "az")
 
 
 class Table:
@@ -45,7 +48,14 @@ class Table:
         if value not in known:
             close = nearest(str(value), known)
             hint = f"did you mean {close}?" if close else f"choose one of {', '.join(known)}"
-            raise InputError(self.place(key), f"{value!r} is not known", hint)
+            raise InputError(self.place(key), f"{value!r:.60} is not known", hint)
+        return value
+
+    def word(self, key: str) -> str:
+        """The text under `key`, which must be there."""
+        value = self.required(key)
+        if not isinstance(value, str) or not value.strip():
+            raise InputError(self.place(key), f"{value!r:.60} is not a word", f'write {key} = "…"')
         return value
 
     def table(self, key: str) -> "Table":
@@ -71,30 +81,66 @@ def unknown_key(place: str, known: tuple[str, ...], key: str) -> InputError:
     return InputError(place, "unknown key", f"did you mean {close}?" if close else f"known: {', '.join(known)}")
 
 
-def read_number(
-    name: str, entry: Any, place: str, *, free: bool, lower: float = -math.inf, unit: str = ""
-) -> tuple[float, Parameter]:
+def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Parameter]:
     """The number and its row from `value` or `{ value = …, fixed = …, bounds = […], prior_std = … }`.
 
-    `free` says whether a number is free where the file does not say.
+    `default` is the row where the file does not say; its unit is the number's, empty where a mechanism's may be any.
     """
     table = Table(entry if isinstance(entry, dict) else {"value": entry}, place, "")
     for key in table.data:
+        if key == "standard_error":
+            remedy = "delete it, or write prior_std = … to start from what an earlier fit found"
+            raise InputError(f"{place}.{key}", "is what a fit answers, not what it reads", remedy)
         if key not in _NUMBER_KEYS:
             raise unknown_key(f"{place}.{key}", _NUMBER_KEYS, key)
     if "value" not in table.data:
         raise InputError(place, "has no value", "write { value = … }")
     value = _finite(table.data["value"], place)
-    fixed = table.data.get("fixed", not table.data.get("free", free))
-    if not isinstance(fixed, bool):
-        raise InputError(f"{place}.fixed", f"is {fixed!r:.60}", "write true or false")
-    low, high = _bounds(table.data.get("bounds", [lower, math.inf]), place)
+    low, high = _bounds(table.data.get("bounds", [default.lower, default.upper]), place)
     if not low <= value <= high:
         raise InputError(place, f"value {value:g} lies outside its bounds [{low:g}, {high:g}]", "mend one of them")
-    prior = _real(table.data.get("prior_std", math.inf))
-    if not prior > 0.0:
-        raise InputError(f"{place}.prior_std", f"is {table.data['prior_std']!r:.60}", "give a positive number")
-    return value, Parameter(name, unit, not fixed, low, high, prior, value)
+    row = dataclasses.replace(default, free=_freedom(table, place, default.free), lower=low, upper=high)
+    if "prior_std" in table.data:
+        row = dataclasses.replace(row, prior_std=_real(table.data["prior_std"]), prior_mean=value)
+        if not row.prior_std > 0.0:
+            raise InputError(f"{place}.prior_std", f"is {table.data['prior_std']!r:.60}", "give a positive number")
+    elif not math.isfinite(row.prior_std):
+        row = dataclasses.replace(row, prior_mean=value)
+    if "prior_mean" in table.data:
+        if not math.isfinite(row.prior_std):
+            raise InputError(f"{place}.prior_mean", "is given without prior_std", "add prior_std = …")
+        row = dataclasses.replace(row, prior_mean=_finite(table.data["prior_mean"], f"{place}.prior_mean"))
+    return value, dataclasses.replace(row, unit=_unit(table, place, default.unit))
+
+
+def _freedom(table: Table, place: str, free: bool) -> bool:
+    """Whether an estimator may move a number, `free` where its `table` does not say."""
+    given = [key for key in ("fixed", "free") if key in table.data]
+    if len(given) == 2:
+        raise InputError(place, "has both fixed and free", "write one of them")
+    for key in given:
+        if not isinstance(table.data[key], bool):
+            raise InputError(f"{place}.{key}", f"is {table.data[key]!r:.60}", "write true or false")
+        return table.data[key] == (key == "free")
+    return free
+
+
+def _unit(table: Table, place: str, expected: str) -> str:
+    """The unit of a number, refused where its `table` states one that is not `expected` or not SI."""
+    if "unit" not in table.data:
+        return expected
+    stated, place = table.data["unit"], f"{place}.unit"
+    if not isinstance(stated, str):
+        raise InputError(place, f"{stated!r:.60} is not a word", 'write unit = "N" and the like')
+    try:
+        if not is_si(stated):
+            remedy = f"give the number in {expected or si_unit(stated) or '1'}"
+            raise InputError(place, f"is {stated!r}, and numbers of a vehicle file are in SI", remedy)
+        if expected and not same_dimension(stated, expected):
+            raise InputError(place, f"is {stated!r}, and the number is in {expected}", f'write unit = "{expected}"')
+    except UnknownUnit as error:
+        raise InputError(place, str(error), error.remedy) from error
+    return expected or stated
 
 
 def read_option(table: Table, key: str, field: dataclasses.Field) -> Any:
@@ -103,7 +149,7 @@ def read_option(table: Table, key: str, field: dataclasses.Field) -> Any:
         return field.default
     value, form = table.required(key), field.type
     if form is str and not isinstance(value, str):
-        raise InputError(table.place(key), f"{value!r} is not a word", f'write {key} = "…"')
+        raise InputError(table.place(key), f"{value!r:.60} is not a word", f'write {key} = "…"')
     if form is float and not (value := _finite(value, table.place(key))) > 0.0 and "signed" not in field.metadata:
         raise InputError(table.place(key), f"is {value:g}", "give a positive number")
     return value if form in (str, float) else table.names(key)
@@ -135,8 +181,10 @@ def _bounds(value: Any, place: str) -> tuple[float, float]:
 def read_pairs(table: Table) -> tuple[tuple[str, str], ...]:
     """(name in the model, column of the recording) pairs of `[inputs]` and its like."""
     for key, column in table.items():
-        if not isinstance(column, str):
-            raise InputError(table.place(key), f"{column!r} is not a column name", f'write {key} = "column"')
+        if not isinstance(column, str) or not column.strip():
+            raise InputError(table.place(key), f"{column!r:.60} is not a column name", f'write {key} = "column"')
+        if re.search(r"[\[\]]", column):
+            raise InputError(table.place(key), f"{column!r} has brackets", "name the column without its unit")
     return tuple(table.items())
 
 
@@ -152,8 +200,11 @@ def read_outputs(table: Table) -> tuple[Output, ...]:
             if sigma <= 0.0:
                 raise InputError(entry.place("sigma"), f"is {sigma:g}", 'give a positive number or "estimate"')
         arm = entry.data.get("lever_arm", [0.0, 0.0, 0.0])
+        if "lever_arm" in entry.data and channel not in _ACCELEROMETER:
+            remedy = 'give it to ax, ay or az; other channels take [[effects]] effect = "sensor-lever-arm"'
+            raise InputError(entry.place("lever_arm"), f"{channel} does not use it", remedy)
         if not isinstance(arm, list) or len(arm) != 3:
-            raise InputError(entry.place("lever_arm"), f"is {arm!r}", "give three numbers in m")
+            raise InputError(entry.place("lever_arm"), f"is {arm!r:.60}", "give three numbers in m")
         x, y, z = (_finite(item, entry.place("lever_arm")) for item in arm)
         outputs.append(Output(channel, None if sigma == "estimate" else sigma, (x, y, z)))
     if not outputs:

@@ -4,7 +4,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import tomlkit
 
 from ..effects import AbstractEffect, options, parameter_table
@@ -33,7 +32,9 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     coefficients = tomlkit.table()
     for name in own:
         if not isinstance(vehicle, SubmergedBody) or name not in _body_names():
-            coefficients[name] = _number_table(own[name], rows.get(name), free=True)
+            row = rows.get(name, Parameter(name, free=False))
+            unit = "" if isinstance(vehicle, SubmergedBody) else row.unit
+            coefficients[name] = _number_table(own[name], row, Parameter(name), unit)
     document["coefficients"] = coefficients
     for section, pairs in (
         ("inputs", layout.inputs), ("prescribed", layout.prescribed), ("environment", layout.environment)
@@ -61,10 +62,10 @@ def _body_table(vehicle: SubmergedBody, values: dict[str, float], rows: dict[str
     table = tomlkit.table()
     for key in BODY_KEYS:
         if key in VECTORS:
-            items = [_number_table(values[name], rows.get(name), free=False) for name in VECTORS[key]]
+            items = [_number_table(values[name], rows.get(name), Parameter(name, free=False)) for name in VECTORS[key]]
             table[key] = items
         elif key in values:
-            table[key] = _number_table(values[key], rows.get(key), free=False)
+            table[key] = _number_table(values[key], rows.get(key), Parameter(key, free=False))
     table["reference_density"] = vehicle.restoring.reference_density
     table["length"], table["diameter"] = vehicle.layout.length, vehicle.layout.diameter
     return table
@@ -78,28 +79,26 @@ def _effect_table(effect: AbstractEffect, rows: dict[str, Parameter]) -> Any:
         table[name.rstrip("_")] = list(value) if isinstance(value, tuple) else value
     table["expression"] = effect.expression
     symbols, numbers = effect.symbols(), parameter_table(effect)
-    written = lambda field, row: _number_table(
-        float(getattr(effect, field)), rows.get(row.name), free=True, prior_std=row.prior_std
-    )
+    written = lambda field, row: _number_table(float(getattr(effect, field)), rows.get(row.name), row)
     table["parameters"] = {symbols[field]: written(field, row) for field, row in numbers.items()}
     return table
 
 
-def _number_table(value: float, row: Parameter | None, *, free: bool, prior_std: float = math.inf) -> Any:
-    """A bare number where a body entry is plain, else an inline table.
-
-    `free` and `prior_std` are what the file takes for granted.
-    """
-    row = row or Parameter("", free=False)
-    bounded, informed = np.isfinite([row.lower, row.upper]).any(), row.prior_std != prior_std
-    if not free and not row.free:
-        return value
+def _number_table(value: float, row: Parameter | None, default: Parameter, unit: str = "") -> Any:
+    """A bare number where a body entry is plain, else an inline table of what differs from the `default` row."""
+    row = row or default
     table = tomlkit.inline_table()
     table["value"] = value
-    if row.free != free:
+    if row.free != default.free:
         table["fixed"] = not row.free
-    if bounded:
+    if (row.lower, row.upper) != (default.lower, default.upper):
         table["bounds"] = [row.lower, row.upper]
-    if informed:
+    if row.prior_std != default.prior_std:
         table["prior_std"] = row.prior_std
-    return table
+    # read without it, the prior's mean is the value, or that of the effect's own prior
+    mean = value if "prior_std" in table or not math.isfinite(row.prior_std) else default.prior_mean
+    if math.isfinite(row.prior_std) and row.prior_mean != mean:
+        table["prior_mean"] = row.prior_mean
+    if unit:
+        table["unit"] = unit
+    return value if not default.free and len(table) == 1 else table
