@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InputError
 from ..findings import Finding
 from ..recording import Recording
-from ..vehicle import AbstractVehicle
+from ..vehicle import AbstractVehicle, vehicle_findings
 from .channels import Channel, channels_of
 from .duplicates import duplicates
 from .ranges import impossible, sample_interval
@@ -49,7 +49,7 @@ def check(vehicle: AbstractVehicle, recordings: Sequence[Recording], held_out: S
     body = layout.kind == "submerged-body"
     every = [*recordings, *held_out]
     known = {name for recording in every for name in recording.columns}
-    mended, found = [], duplicates(recordings, held_out)
+    mended, found = [], [*vehicle_findings(vehicle, layout.name), *duplicates(recordings, held_out)]
     for recording in every:
         parts, findings = _run(recording, channels, known, body)
         mended.append(parts)

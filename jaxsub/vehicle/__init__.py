@@ -5,6 +5,7 @@ from .build import build
 from .checks import require_inertia
 from .dimensions import check_units
 from .mechanism import Mechanism
+from .oddities import vehicle_findings
 from .read import read_vehicle, vehicle_from
 from .submerged_body import SubmergedBody
 from .write import vehicle_text, write_vehicle
@@ -19,6 +20,7 @@ __all__ = [
     "check_units",
     "read_vehicle",
     "require_inertia",
+    "vehicle_findings",
     "vehicle_from",
     "vehicle_text",
     "write_vehicle",

@@ -1,5 +1,6 @@
 """A vehicle file with a mistake is refused in one line that names the file, the key, what is wrong and the remedy."""
 
+import os
 import re
 
 import pytest
@@ -146,6 +147,25 @@ def test_files_without_the_mistakes_are_read(tmp_path):
         path = tmp_path / f"{name}.toml"
         path.write_bytes(b"\xef\xbb\xbf" + text.encode())
         assert isinstance(read_vehicle(path), kind)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir, lambda path: os.symlink("/dev/zero", path)])
+def test_path_that_is_no_file_is_refused_at_once(tmp_path, make):
+    make(tmp_path / "vehicle.toml")
+    with pytest.raises(InputError, match=r"vehicle\.toml: is (no file|a folder); give the path of a vehicle file"):
+        read_vehicle(tmp_path / "vehicle.toml")
+
+
+def test_path_with_a_nul_is_refused():
+    with pytest.raises(InputError, match=r"a\\0b.toml: is no path"):
+        read_vehicle("a\0b.toml")
+
+
+def test_enormous_file_is_refused_unread(tmp_path):
+    with (tmp_path / "vehicle.toml").open("wb") as file:
+        file.truncate(10**12)  # a sparse file
+    with pytest.raises(InputError, match="has 1000000 MB, more than 4; "):
+        read_vehicle(tmp_path / "vehicle.toml")
 
 
 @pytest.mark.parametrize(("content", "message"), [(None, "cannot be read"), (b"\xff\xfe\x00", "is not text")])

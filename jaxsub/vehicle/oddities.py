@@ -1,0 +1,112 @@
+"""What is odd about a vehicle that can be simulated all the same: numbers and names that change nothing, and some that
+no rigid body has."""
+
+from collections.abc import Iterator
+
+from ..effects import EQUATIONS, GRAVITY, VELOCITIES, AbstractEffect, options
+from ..findings import Finding
+from .base import AbstractVehicle, Layout
+from .coefficient_units import ADDED, CONTROL, DAMPING
+from .control import needs
+from .inertia import place
+from .mechanism import Mechanism
+from .submerged_body import SubmergedBody
+
+_TOLERANCE = 0.01  # of an inertia or a weight: such numbers are given to two or three digits
+
+
+def vehicle_findings(vehicle: AbstractVehicle, where: str) -> tuple[Finding, ...]:
+    """Warnings and notes about `vehicle`, of the file `where`.
+
+    A body's inertia that breaks the triangle inequality, a weight that is not mass times gravity, coefficients of
+    locked degrees of freedom, actuators that move nothing; of a mechanism a coupling that stands for both directions.
+    """
+    found: list[Finding] = []
+    if isinstance(vehicle, SubmergedBody):
+        found += _rigid(vehicle, where)
+        found += _locked(vehicle, where)
+    if isinstance(vehicle, Mechanism):
+        found += _couplings(vehicle, where)
+    return (*found, *_idle(vehicle, where))
+
+
+def _rigid(body: SubmergedBody, where: str) -> Iterator[Finding]:
+    inertia = {name: float(body.inertia.rigid[name]) for name in ("I_x", "I_y", "I_z")}
+    largest = max(inertia, key=lambda name: inertia[name])
+    others = [name for name in inertia if name != largest]
+    total = sum(inertia[name] for name in others)
+    if inertia[largest] > (1.0 + _TOLERANCE) * total:
+        what = (
+            f"{largest} = {inertia[largest]:g} kg m² exceeds {' + '.join(others)} = {total:g} kg m² as in no rigid body"
+        )
+        remedy = "check the numbers; added inertia belongs to K_pdot, M_qdot and N_rdot"
+        yield Finding("inertia-triangle", "warning", f"{where}: body.inertia", what, remedy)
+    weight, mass = float(body.restoring.values["weight"]), float(body.inertia.rigid["mass"])
+    if abs(weight / (mass * GRAVITY) - 1.0) > _TOLERANCE:
+        what = f"{weight:g} N is not mass times gravity, {mass * GRAVITY:g} N"
+        yield Finding("weight", "warning", f"{where}: body.weight", what, "give the weight in N, or leave it out")
+
+
+def _locked(body: SubmergedBody, where: str) -> Iterator[Finding]:
+    without = [name for name in body.own_values() if not _acts(name, body.layout)]
+    if without:
+        free = ", ".join(body.layout.equations)
+        what = f"{', '.join(without)} act on or through locked degrees of freedom, so they change nothing"
+        yield Finding("locked", "warning", f"{where}: coefficients", what, f"delete them or free more in dof: {free}")
+
+
+def _acts(name: str, layout: Layout) -> bool:
+    """Whether a body's number can change its motion; those of `[body]` all can."""
+    moved = {*layout.equations, *(e for e, v in VELOCITIES.items() if v in dict(layout.prescribed))}
+    if CONTROL.match(name):
+        return EQUATIONS["XYZKMN".index(name[0])] in layout.equations
+    if not ADDED.match(name) and not DAMPING.match(name):
+        return True
+    row, column = (EQUATIONS[index] for index in place(name))
+    if ADDED.match(name):  # accelerations of prescribed motions are neglected
+        return row in layout.equations and column in layout.equations
+    return row in layout.equations and column in moved
+
+
+def _idle(vehicle: AbstractVehicle, where: str) -> Iterator[Finding]:
+    layout, named = vehicle.layout, {word for effect in vehicle.effects for word in _words(effect)}
+    for actuator, _ in layout.inputs:
+        if actuator in named or (
+            _drives(vehicle, actuator) if isinstance(vehicle, Mechanism) else _pushes(vehicle, actuator)
+        ):
+            continue
+        what = "moves nothing: no coefficient or effect acts through it on a free degree of freedom"
+        remedy = "give its coefficient, or delete the line"
+        yield Finding("idle-input", "warning", f"{where}: inputs.{actuator}", what, remedy)
+
+
+def _drives(vehicle: Mechanism, actuator: str) -> bool:
+    return any(f"B_{equation}_{actuator}" in vehicle.coefficients for equation in vehicle.layout.equations)
+
+
+def _pushes(vehicle: AbstractVehicle, actuator: str) -> bool:
+    if actuator == "thrust":
+        return "surge" in vehicle.layout.equations
+    control = [name for name in vehicle.own_values() if CONTROL.match(name) and _acts(name, vehicle.layout)]
+    return any(actuator in way for name in control for way in needs(name))
+
+
+def _words(effect: AbstractEffect) -> Iterator[str]:
+    """The names that an effect is told to act on or through."""
+    for value in options(effect).values():
+        if isinstance(value, str):
+            yield from (value, *value.split(","))
+        elif isinstance(value, tuple):
+            yield from value
+
+
+def _couplings(mechanism: Mechanism, where: str) -> Iterator[Finding]:
+    names, coefficients = mechanism.layout.equations, mechanism.coefficients
+    for letter in "DK":
+        for one in names:
+            for other in names:
+                name, mirrored = f"{letter}_{one}_{other}", f"{letter}_{other}_{one}"
+                if one != other and name in coefficients and mirrored not in coefficients:
+                    what = f"acts on {one} and, as {mirrored}, on {other}"
+                    remedy = f"write {mirrored} = {{ value = 0, fixed = true }} where it acts on {one} alone"
+                    yield Finding("coupling", "note", f"{where}: coefficients.{name}", what, remedy)
