@@ -134,7 +134,7 @@ def simulate(vehicle: Path, run: Path, out: Path, start: str, columns: Path | No
 @click.argument("words", nargs=-1)
 @common
 def channels(log: Path, words: tuple[str, ...]) -> None:
-    """List the channels of a vehicle's log, or those whose names hold one of the words."""
+    """List the channels of a log or the columns of a file, or those whose names hold one of the words."""
     from . import channels as command
 
     command.run(log, words)

@@ -1,12 +1,11 @@
-"""`jaxsub channels`: what a vehicle's log holds."""
+"""`jaxsub channels`: what a vehicle's log, or the file of a recording, holds."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
-import click
-
 from ..errors import InputError, nearest
 from ..recording import channels
+from . import terminal
 
 
 def run(log: Path, words: Sequence[str] = ()) -> None:
@@ -18,5 +17,9 @@ def run(log: Path, words: Sequence[str] = ()) -> None:
         remedy = f"did you mean {close!r}?" if close else "name other words, or none for all channels"
         raise InputError(str(log), f"holds no channel named like {' or '.join(words) or 'anything'}", remedy)
     width = max(len(row.name) for row in kept)
-    for row in kept:
-        click.echo(f"{row.name:{width}}  {row.samples:>8}  {row.unit}".rstrip())
+
+    def show() -> None:
+        for row in kept:
+            terminal.say(f"{row.name:{width}}  {row.samples:>8}  {row.unit}".rstrip())
+
+    terminal.emit([row._asdict() for row in kept], show)

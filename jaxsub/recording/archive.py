@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from jaxsub.errors import InputError, nearest
-from jaxsub.recording.reading import reading, require_file, require_plausible
+from jaxsub.recording.bounds import require_plausible
+from jaxsub.recording.reading import reading, require_file
 
 MARK = "!"
 _SUFFIX = ".zip"

@@ -6,11 +6,14 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
+import numpy as np
+
 from jaxsub.errors import InputError
 from jaxsub.recording.archive import MARK, extracted, split_member
 from jaxsub.recording.frames import recorded, to_pandas, to_xarray
 from jaxsub.recording.layout import with_brackets
-from jaxsub.recording.logs import SUFFIXES, Selection, load_log
+from jaxsub.recording.logs import SUFFIXES, Channel, Selection, load_log
+from jaxsub.recording.logs import channels as log_channels
 from jaxsub.recording.matlab import read_matlab
 from jaxsub.recording.netcdf import read_netcdf
 from jaxsub.recording.parquet import read_parquet
@@ -18,6 +21,7 @@ from jaxsub.recording.reading import Contents, require_file
 from jaxsub.recording.recording import Recording
 from jaxsub.recording.text import read_text
 from jaxsub.recording.workbook import read_workbook
+from jaxsub.units import split_header
 
 T = TypeVar("T")
 Units = Mapping[str, str]
@@ -49,6 +53,22 @@ def load(
         raise InputError(str(path), "is no log: its headers name its columns", "leave --columns out")
     contents, name, source = read(path)
     return recorded(contents.table, name, source, contents.first_row, contents.findings)
+
+
+def channels(path: str | os.PathLike[str]) -> list[Channel]:
+    """What a log or the file of a recording holds: name, unit where it states one, and number of samples.
+
+    A column that holds no numbers has no samples. Raises InputError for a file that cannot be read.
+    """
+    path = Path(path)
+    if path.suffix.lower() in SUFFIXES or path.is_dir():
+        return log_channels(path)
+    listed = []
+    for header, values in read(path)[0].table:
+        name, unit = split_header(header)
+        numbers = isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype.kind in "biufmM"
+        listed.append(Channel(name, unit or "", int((~np.isnan(values)).sum()) if numbers else 0))
+    return listed
 
 
 def read(path: Path) -> tuple[Contents, str, str]:

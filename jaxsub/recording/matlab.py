@@ -11,8 +11,9 @@ import h5py
 import numpy as np
 
 from jaxsub.errors import InputError, optional
+from jaxsub.recording.bounds import require_plausible
 from jaxsub.recording.frames import Table
-from jaxsub.recording.reading import Contents, note, reading, require_plausible
+from jaxsub.recording.reading import Contents, note, reading
 from jaxsub.units import TIME
 
 _HEADER = 128  # bytes

@@ -9,8 +9,9 @@ import numpy as np
 import xarray
 
 from jaxsub.findings import Finding
+from jaxsub.recording.bounds import require_plausible
 from jaxsub.recording.frames import variables
-from jaxsub.recording.reading import Contents, note, reading, require_plausible
+from jaxsub.recording.reading import Contents, note, reading
 from jaxsub.units import TIME, split_header
 
 _CLASSIC = b"CDF"

@@ -7,8 +7,9 @@ import pyarrow
 from pyarrow import parquet
 
 from jaxsub.errors import InputError
+from jaxsub.recording.bounds import require_plausible
 from jaxsub.recording.frames import Table
-from jaxsub.recording.reading import Contents, reading, require_plausible
+from jaxsub.recording.reading import Contents, reading
 
 _WIDEST = 8  # bytes of a sample
 

@@ -1,4 +1,4 @@
-"""What all readers share: the check of a path, a bound on what a file may claim, and the error of a damaged file."""
+"""What all readers share: the check of a path, and the error of a damaged file."""
 
 import os
 import stat
@@ -12,9 +12,6 @@ from jaxsub.findings import Finding
 from jaxsub.recording.frames import Table
 from jaxsub.recording.recording import FIRST_ROW
 
-# Deflate expands a constant column 1000 times; what claims more than that, and more than a small file may, is damaged.
-_EXPANSION = 1000
-_ALWAYS = 2**28  # bytes
 _KINDS = (
     (stat.S_ISDIR, "is a folder"),
     (stat.S_ISFIFO, "is a named pipe"),
@@ -50,19 +47,8 @@ def require_file(path: Path, remedy: str = "give the path of a recording") -> in
         if is_kind(status.st_mode):
             raise InputError(shown, what, remedy)
     if not status.st_size:
-        raise InputError(shown, "is empty", "give a file with a header and a row for each sample")
+        raise InputError(shown, "is empty", "check that it was written to the end")
     return status.st_size
-
-
-def require_plausible(source: str, claimed: int, size: int) -> None:
-    """Raise InputError where `size` bytes of a file claim to hold `claimed` bytes of samples and cannot."""
-    if claimed > max(_ALWAYS, _EXPANSION * size):
-        what = f"claims {_bytes(claimed)} of samples in {_bytes(size)}, above {_EXPANSION} times its size"
-        raise InputError(source, what, "check that it is whole, or write it anew")
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if claimed > memory:
-        what = f"holds {_bytes(claimed)} of samples, above the {_bytes(memory)} of memory of this machine"
-        raise InputError(source, what, "divide the file, or leave columns out")
 
 
 @contextmanager
@@ -77,10 +63,3 @@ def reading(source: str, form: str) -> Iterator[None]:
     except Exception as error:  # no library promises what it raises on a damaged file
         said = str(error).replace("\0", "\\0")[:300] or type(error).__name__
         raise InputError(source, f"cannot be read ({said})", f"check that it is whole and is {form}") from error
-
-
-def _bytes(count: int) -> str:
-    for power, name in ((4, "TiB"), (3, "GiB"), (2, "MiB"), (1, "KiB")):
-        if count >= 1024**power:
-            return f"{count / 1024**power:.3g} {name}"
-    return f"{count} bytes"

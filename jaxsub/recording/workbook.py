@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from jaxsub.errors import InputError, optional
+from jaxsub.recording.bounds import require_plausible
 from jaxsub.recording.layout import find_layout, is_blank, is_comment
 from jaxsub.recording.numbers import Cell
-from jaxsub.recording.reading import Contents, reading, require_plausible
+from jaxsub.recording.reading import Contents, reading
 from jaxsub.recording.text import contents, tabulate
 from jaxsub.units import TIME, split_header
 

@@ -2,16 +2,18 @@
 
 import dataclasses
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
+from ...findings import Finding
 from ...units import TIME, UnknownUnit, column_unit, si_unit, split_header, to_si
+from ..reading import note, reading, require_file
 from ..recording import Recording
+from .ardupilot import DataFlash, Telemetry
 from .log import Channel, Log, Series, taken
 from .mcap import McapLog
 from .merge import merged
@@ -22,6 +24,7 @@ from .ulog import ULog
 
 _SLOCUM = [f".{kind}{form}d" for form in "bc" for kind in "destmn"]
 _KINDS: dict[str, Callable[[Path], Log]] = {".ulg": ULog, ".mcap": McapLog, ".bag": RosBag, ".db3": RosBag}
+_KINDS |= {".bin": DataFlash, ".tlog": Telemetry}
 _KINDS |= dict.fromkeys(_SLOCUM, SlocumLog)
 SUFFIXES = tuple(_KINDS)
 _AXES = ("yaw", "pitch", "roll")
@@ -30,11 +33,12 @@ _AXES = ("yaw", "pitch", "roll")
 def channels(path: str | os.PathLike[str]) -> list[Channel]:
     """What a log holds: each channel's name, unit where the log states one, and number of samples.
 
-    The kinds are PX4's .ulg, .mcap, .bag, .db3, a ROS 2 bag's folder, and Slocum's .dbd, .ebd, .sbd, .tbd, .mbd, .nbd.
+    The kinds are PX4's .ulg, ArduPilot's .bin and .tlog, .mcap, .bag, .db3, a ROS 2 bag's folder, and Slocum's .dbd,
+    .ebd, .sbd, .tbd, .mbd, .nbd.
     Raises InputError for a file that cannot be read, or whose reader (`pip install 'jaxsub[logs]'`) is not installed.
     """
     path = Path(path)
-    with _reading(path):
+    with reading(str(path), "a log"):
         return opened(path).channels()
 
 
@@ -54,12 +58,12 @@ def load_log(
     path = Path(path)
     chosen = selection if isinstance(selection, Selection) else Selection(selection)
     terms = {header: chosen.term(header) for header in chosen.columns}
-    with _reading(path):
+    with reading(str(path), "a log"):
         log = opened(path)
         found = taken(log, str(path), sorted({t.channel for t in terms.values() if t.function not in _AXES}))
         turned = {c: _attitude(log, path, c) for c in {t.channel for t in terms.values() if t.function in _AXES}}
     columns: dict[str, Series] = {}
-    units: dict[str, str] = {}
+    findings: list[Finding] = []
     for header, term in terms.items():
         name, unit = split_header(header)
         where = f"{chosen.source}, column {header!r}"
@@ -67,16 +71,19 @@ def load_log(
             raise InputError(where, "is there already", "give each column one line; a log brings its own times")
         source = turned[term.channel][term.function] if term.function in _AXES else found[term.channel]
         columns[name] = _column(where, name, source, term, unit)
-        units |= {name: columns[name].unit} if columns[name].unit else {}
+        if unit is None and source.unit and columns[name].unit == "":
+            what = f"{chosen.columns[header]!r} is taken in {source.unit}, the unit that the log states"
+            findings.append(note(str(path), "unit", what, name))
     span = {"every": chosen.every, "start": chosen.start, "end": chosen.end}
     run = merged(columns, path.stem, str(path), held=held, interpolated=interpolated, **span)
-    return dataclasses.replace(run, units=units)
+    units = {name: column.unit for name, column in columns.items() if column.unit}
+    return dataclasses.replace(run, units=units, findings=(*findings, *run.findings))
 
 
 def opened(path: Path) -> Log:
     """The log at `path`, by its suffix; a folder is a ROS 2 bag."""
-    if not path.exists():
-        raise InputError(str(path), "no such file", "give the path of a log")
+    if not path.is_dir():
+        require_file(path, "give the path of a log")
     kind = RosBag if path.is_dir() else _KINDS.get(path.suffix.lower())
     if kind is None:
         raise InputError(str(path), f"unknown extension {path.suffix!r}", f"logs are {', '.join(SUFFIXES)}")
@@ -84,16 +91,25 @@ def opened(path: Path) -> Log:
 
 
 def _column(where: str, name: str, series: Series, term: Term, unit: str | None) -> Series:
-    """In SI, turned and scaled as `term` says; without a unit where a factor may change it."""
+    """In SI, turned, scaled and shifted as `term` says; without a unit where a factor may change the log's own."""
     stated = column_unit(name, series.unit if unit is None else unit)
     try:
-        values, si = (to_si(series.values, stated), si_unit(stated) or "1") if stated else (series.values, "")
+        si = (si_unit(stated) or "1") if stated else ""
+        in_si = lambda values: to_si(values, stated) if stated else np.asarray(values, np.float64)
+        one, none = in_si(np.array([1.0, 0.0]))
     except UnknownUnit as error:
         raise InputError(where, str(error), f"state the channel's unit as name[unit]; {error.remedy}") from error
+    if term.function in _AXES and stated and (one, none) != (1.0, 0.0):
+        raise InputError(where, f"{term.function}() is in rad, not {stated}", f"head it {name} or {name}[rad]")
+    times, values = series.times, series.values
     if term.function == "unwrap":
         kept = ~np.isnan(values)
-        series, values = Series(series.times[kept], values[kept]), np.unwrap(values[kept])
-    return Series(series.times, term.factor * values, si if abs(term.factor) == 1.0 else "")
+        times, values = times[kept], np.unwrap(in_si(values[kept]))
+        values = term.factor * values + term.offset * (one - none)
+    else:
+        values = in_si(term.factor * values + term.offset)
+    plain = unit is not None or (abs(term.factor) == 1.0 and term.offset == 0.0)
+    return Series(times, values, si if plain else "")
 
 
 def _attitude(log: Log, path: Path, name: str) -> dict[str, Series]:
@@ -106,16 +122,6 @@ def _attitude(log: Log, path: Path, name: str) -> dict[str, Series]:
             good = np.isfinite(parts).all(axis=1) & (np.abs(parts) > 0.0).any(axis=1)
             angles = Rotation.from_quat(parts[good]).as_euler("ZYX")
             angles[:, 0] = np.unwrap(angles[:, 0])
-            return {axis: Series(found[form[0]].times[good], angles[:, i]) for i, axis in enumerate(_AXES)}
+            return {axis: Series(found[form[0]].times[good], angles[:, i], "rad") for i, axis in enumerate(_AXES)}
     remedy = f"it needs {forms[0][3]}, {forms[0][0]} and so on, or {forms[1][0]} to {forms[1][3]}"
     raise InputError(str(path), f"holds no quaternion {name!r}", remedy)
-
-
-@contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:  # no library promises what it raises on a damaged file
-        raise InputError(str(path), f"cannot be read ({error})", "check that it is whole, and a log") from error

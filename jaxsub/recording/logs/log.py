@@ -86,6 +86,8 @@ def taken(log: Log, source: str, names: list[str]) -> dict[str, Series]:
         if name not in found:
             close = nearest(name, [channel.name for channel in log.channels()])
             remedy = f"did you mean {close!r}?" if close else f"`jaxsub channels {source}` lists what it holds"
+            if re.search(r"[-+/]\d|\d[-+/]", name):
+                remedy += "; in arithmetic, set blanks around + - /"
             raise InputError(source, f"holds no channel {name!r}", remedy)
     return found
 

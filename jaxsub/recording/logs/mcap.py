@@ -1,18 +1,35 @@
 """MCAP files (.mcap) whose messages are JSON, or ROS 1 or ROS 2 messages that carry their definitions."""
 
+import io
 import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ...errors import InputError, optional
+from ..bounds import require_plausible
 from .log import MessageLog
 
 _NANO = 1e-9
 
 
+class _Clamped(io.BufferedReader):
+    """A file that sets no memory aside for more bytes than are left, whatever length its records claim."""
+
+    def __init__(self, path: Path):
+        super().__init__(io.FileIO(path))
+        self._size = path.stat().st_size
+
+    def read(self, size: int | None = -1) -> bytes:
+        """The next bytes, as many as are there."""
+        return super().read(size if size is None or size < 0 else min(size, max(0, self._size - self.tell())))
+
+
 class McapLog(MessageLog):
-    """Read by the package mcap, and ROS messages in it by rosbags. Source: mcap.dev, MCAP Format Specification."""
+    """Read by the package mcap, and ROS messages in it by rosbags; a message's time is its log time.
+
+    Source: mcap.dev, MCAP Format Specification.
+    """
 
     def __init__(self, path: Path):
         self._path = path
@@ -20,7 +37,7 @@ class McapLog(MessageLog):
 
     def topics(self) -> Mapping[str, int]:
         """From the summary at the end of the file or, where an interrupted log has none, by counting."""
-        with self._path.open("rb") as file:
+        with _Clamped(self._path) as file:
             reader = self._reader.make_reader(file)
             summary = reader.get_summary()
             if summary is not None and summary.statistics is not None:
@@ -34,11 +51,19 @@ class McapLog(MessageLog):
     def messages(self, topics: list[str]) -> Iterator[tuple[str, float, Any]]:
         """Raises InputError for a topic in an encoding that is not read."""
         decoders: dict[int, Callable[[bytes], Any]] = {}
-        with self._path.open("rb") as file:
+        with _Clamped(self._path) as file:
+            self._check(file)
             for schema, channel, message in self._reader.make_reader(file).iter_messages(topics):
                 if channel.id not in decoders:
                     decoders[channel.id] = self._decoder(channel, schema)
-                yield channel.topic, _NANO * message.publish_time, decoders[channel.id](message.data)
+                yield channel.topic, _NANO * message.log_time, decoders[channel.id](message.data)
+
+    def _check(self, file: BinaryIO) -> None:
+        """Raise InputError where a chunk claims to expand to more than it plausibly holds."""
+        summary = self._reader.make_reader(file).get_summary()
+        for chunk in summary.chunk_indexes if summary is not None else ():
+            require_plausible(str(self._path), chunk.uncompressed_size, chunk.compressed_size)
+        file.seek(0)
 
     def _decoder(self, channel: Any, schema: Any) -> Callable[[bytes], Any]:
         encoding = channel.message_encoding

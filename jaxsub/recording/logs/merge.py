@@ -6,9 +6,13 @@ import numpy as np
 
 from ...errors import InputError
 from ..recording import Recording
+from .clocks import require_common_clock, without_strays
 from .log import Series
 
 _TICK = 1e-6  # s
+_MOST = 1e8  # rows
+_ANGLES = ("phi", "theta", "psi")
+_ANGULAR = ("heading", "yaw", "course", "bearing", "compass", "azimuth")
 
 
 def merged(
@@ -27,18 +31,27 @@ def merged(
     The rows are all times, to 1 µs, at which an output or a held input was sampled, and an output is missing in the
     others. With `every` (s) the rows stand that far apart: each output's sample goes to the nearest row, the nearer of
     two, so that its time is rounded by half of `every` at most. In each row a `held` column has its last sample so far
-    and an `interpolated` one lies between two. What comes before or after these are known is cut off, and so is what
-    lies outside `start` to `end`. Raises InputError where nothing is left.
+    and an `interpolated` one lies between two, if it is an angle by the shorter way. What comes before or after these
+    are known is cut off, and so is what lies outside `start` to `end`. Single stamps far from all others are dropped
+    and reported. Raises InputError where nothing is left, of all columns or of one, and for clocks that never meet.
     """
     known = {column: _known(one) for column, one in series.items()}
     for column, (times, _, _) in known.items():
         if not times.size:
             raise InputError(f"{source}, column {column!r}", "its channel holds no number", "leave the column out")
+    known, findings = without_strays(known, source)
+    require_common_clock(known, source)
     origin = min(times.min() for times, _, _ in known.values())
     tidy = {column: _tidy(one, origin) for column, one in known.items()}
+    for column in set(interpolated) & set(tidy):
+        if _is_wrapped(column, known[column].unit, tidy[column][1]):
+            tidy[column] = (tidy[column][0], np.unwrap(tidy[column][1]))
     sampled = [times for column, (times, _) in tidy.items() if column not in interpolated]
     rows = np.unique(np.concatenate(sampled or [times for times, _ in tidy.values()]))
     if every is not None:
+        if (rows[-1] - rows[0]) / every > _MOST:
+            what = f"rows every {every:g} s from {rows[0]:.6g} to {rows[-1]:.6g} s are more than {_MOST:g}"
+            raise InputError(source, what, "set a longer `every`")
         rows = every * np.arange(np.floor(rows[0] / every), np.ceil(rows[-1] / every) + 1.0)
     first = max([tidy[c][0][0] for c in (*held, *interpolated) if c in tidy], default=rows[0])
     last = min([tidy[c][0][-1] for c in interpolated if c in tidy], default=rows[-1])
@@ -47,7 +60,17 @@ def merged(
     if rows.size < 2:
         raise InputError(source, f"the columns have no time in common ({_spans(tidy)})", "see whether clocks differ")
     columns = {c: _onto(rows, *tidy[c], c in held, c in interpolated, every) for c in tidy}
-    return Recording(name, rows, columns, source)
+    for column, values in columns.items():
+        if np.isnan(values).all():
+            what = f"has no sample in the rows from {rows[0]:.6g} to {rows[-1]:.6g} s ({_spans(tidy)})"
+            raise InputError(f"{source}, column {column!r}", what, "see whether clocks differ, or leave it out")
+    return Recording(name, rows, columns, source, findings=findings)
+
+
+def _is_wrapped(column: str, unit: str, values: np.ndarray) -> bool:
+    """Whether a column is an angle, rad, between limits a turn apart, such as a compass that passes through north."""
+    named = column in _ANGLES or any(word in column.lower() for word in _ANGULAR)
+    return (unit == "rad" or (not unit and named)) and float(np.ptp(values)) <= 2.0 * np.pi * (1.0 + 1e-6)
 
 
 def _known(series: Series) -> Series:

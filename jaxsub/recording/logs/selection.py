@@ -3,27 +3,15 @@
 import dataclasses
 import math
 import os
-import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...errors import InputError, nearest
+from .arithmetic import Term, parse_term
 
 _SPAN = ("every", "start", "end")
-_FUNCTIONS = ("roll", "pitch", "yaw", "unwrap")
-_NUMBER = r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
-_TERM = re.compile(rf"(?:(?P<factor>{_NUMBER})\s*\*|(?P<sign>-))?\s*(?P<rest>[^\s*]+)")
-_CALL = re.compile(rf"(?P<function>{'|'.join(_FUNCTIONS)})\((?P<channel>[^()]+)\)")
-
-
-class Term(NamedTuple):
-    """`factor * function(channel)`; `function` may be empty."""
-
-    factor: float
-    function: str
-    channel: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,8 +20,9 @@ class Selection:
 
     **Fields**
 
-    - `columns`: what each column is, under a header `name[unit]` whose unit is the channel's; without one it is the
-      unit that the log states, else SI. Written as a channel, `-channel` or `0.35 * channel`; in place of a channel
+    - `columns`: what each column is, under a header `name[unit]` whose unit is the result's; without one it is the
+      unit that the log states, else SI. Written as a channel, scaled and shifted at will: `-channel`, `0.35 * channel`,
+      `(channel - 1500) * 0.001`, `90 - channel`, with blanks around `+`, `-` and `/`. In place of a channel
       `unwrap(channel)` is an angle without jumps of a turn, and `roll(q)`, `pitch(q)`, `yaw(q)` are the Euler angles
       (yaw, pitch, roll in that order, rad) of the quaternion `q[0]` to `q[3]` (scalar first) or `q.x`, `q.y`, `q.z`,
       `q.w`.
@@ -62,12 +51,11 @@ class Selection:
     def term(self, header: str) -> Term:
         """What the column under `header` is."""
         text = self.columns[header]
-        if not (found := _TERM.fullmatch(text.strip())):
-            where = f"{self.source}, column {header!r}"
-            raise InputError(where, f"{text!r} is no channel", "write it like 'topic.field', '-roll(q)', '0.35 * x'")
-        factor = float(found["factor"]) if found["factor"] else (-1.0 if found["sign"] else 1.0)
-        call = _CALL.fullmatch(found["rest"])
-        return Term(factor, call["function"], call["channel"]) if call else Term(factor, "", found["rest"])
+        try:
+            return parse_term(text)
+        except ValueError as error:
+            remedy = "write it like 'topic.field', '-roll(q)' or '(x - 1500) * 0.001'"
+            raise InputError(f"{self.source}, column {header!r}", f"{text!r:.60} {error}", remedy) from error
 
 
 def read_selection(path: str | os.PathLike[str]) -> Selection:

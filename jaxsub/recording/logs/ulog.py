@@ -1,14 +1,17 @@
 """PX4's ULog (.ulg), read by pyulog."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import optional
+from ...errors import InputError, optional
 from .log import Channel, Log, Series
 
 _MICRO = 1e-6  # its stamps are in µs
+_LONGEST = 2**16  # bytes of a message
+_DEFINITIONS = 2**22  # bytes of a log in which its formats stand
 
 
 class ULog(Log):
@@ -43,7 +46,16 @@ class ULog(Log):
 
     def _read(self, topics: list[str] | None) -> Any:
         with self._path.open("rb") as file:
+            self._check(file.read(_DEFINITIONS))
+            file.seek(0)
             return self._package.ULog(file, topics)
+
+    def _check(self, head: bytes) -> None:
+        """Raise InputError for an array longer than a message can be, whose parts the reader would name one by one."""
+        for count in re.findall(rb"\w\[(\d+)\] \w", head):
+            if int(count[:9]) > _LONGEST:
+                what = f"claims an array of {count[:20].decode()} numbers in a message"
+                raise InputError(str(self._path), what, "check that it is whole")
 
 
 def _topic(data: Any) -> str:
