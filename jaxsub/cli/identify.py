@@ -1,7 +1,6 @@
-"""`jaxsub identify`: coefficients with standard errors, and what the recordings leave open."""
+"""`jaxsub identify`: coefficients with standard errors, whether they explain the runs, and what the runs leave open."""
 
-import csv
-import dataclasses
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,15 +8,17 @@ import numpy as np
 
 from ..discrepancy import batch
 from ..errors import InputError
-from ..estimate import METHODS, Fit, fit, posterior
-from ..identifiability import Coloured, Identifiability, Verdict, coloured_covariance, identifiability
-from ..plain import to_json
-from ..report.text import unit
-from ..results import RESULTS
-from ..vehicle import read_vehicle, write_vehicle
+from ..estimate import METHODS, Fit, assess, fit, posterior, require_free
+from ..identifiability import coloured_covariance, identifiability
+from ..recording.runs import Runs
+from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
+from .identification import Identification
 from .output import fresh_folder, refuse_existing
 from .runs import load_runs
+
+# the shell's exit code of a command that SIGINT ended
+_INTERRUPTED = 130
 
 
 def run(
@@ -32,77 +33,57 @@ def run(
     """Fit the vehicle to the recordings by `method`; write `fitted.toml`, `coefficients.csv`, `identification.json`.
 
     Of logs the file at `columns` says what to take. Where it is to be `drawn` from, the posterior is in `posterior.nc`.
+    The verdict is shown before anything is written. What is interrupted after the fit keeps the fit.
     """
     session.start()
     refuse_existing(out, overwrite)
     vehicle = read_vehicle(vehicle_path)
+    require_free(vehicle, str(vehicle_path))
     recordings = load_runs(runs, vehicle, columns)
-    with fresh_folder(out, overwrite) as folder, terminal.progress(f"identifying {vehicle.layout.name}") as told:
+    with terminal.progress(f"identifying {vehicle.layout.name}") as told:
         told(f"fitting by {method}")
-        # Gauss–Newton by its own name is what `fit` does unasked, and that finds a start where the file's does not run
-        chosen = None if method == "gauss-newton" else METHODS[method.replace("-", "_")]()
-        found = fit(vehicle, batch(vehicle, recordings), method=chosen)
-        if not np.isfinite(float(found.cost)):
-            what = "the model does not run from these values"
-            raise InputError(str(vehicle_path), what, "give values that are closer, or another --method")
+        found = _fitted(vehicle, batch(vehicle, recordings), method, str(vehicle_path))
         told("asking what the recordings identify")
-        said, coloured = identifiability(found), coloured_covariance(found)
-        _write(found, said, coloured, method, folder)
-        if drawn:
-            told("drawing from the posterior")
-            posterior(found).to_netcdf(folder / "posterior.nc", engine="h5netcdf")
-    _show(found, said, coloured)
+        identified = _identified(found, method, ", ".join(map(str, runs)))
+    terminal.emit(identified.to_json(), lambda: _show(identified))
+    terminal.warn(identified.findings)
+    with fresh_folder(out, overwrite) as folder:
+        identified.write(folder)
+        if drawn and identified.complete:
+            with terminal.progress(f"identifying {vehicle.layout.name}") as told:
+                told("drawing from the posterior")
+                posterior(found).to_netcdf(folder / "posterior.nc", engine="h5netcdf")
+    if not identified.complete:
+        terminal.console.print(f"jaxsub: interrupted after the fit; {out} holds the fit and what followed it so far")
+        sys.exit(_INTERRUPTED)
 
 
-def _write(found: Fit, said: Identifiability, coloured: Coloured, method: str, folder: Path) -> None:
-    write_vehicle(found.vehicle, folder / "fitted.toml", "fitted by jaxsub")
-    units = {row.name: row.unit for row in found.vehicle.layout.free}
-    with (folder / "coefficients.csv").open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(["name", "value", "standard_error", "unit", "standard_error_coloured", "verdict"])
-        white, wide = found.standard_errors, coloured.standard_errors
-        kind = {verdict.name: verdict.kind for verdict in said.verdicts}
-        table.writerows([n, v, white[n], units[n], wide[n], kind[n]] for n, v in found.values.items())
-    content = {
-        "schema": 1,
-        "method": method,
-        "result": "successful" if bool(found.result == RESULTS.successful) else RESULTS[found.result],
-        "cost": float(found.cost),
-        "gradient_norm": float(found.gradient_norm),
-        "steps": int(found.steps),
-        "fit": found.rms,
-        "identifiability": {
-            "rank": said.rank,
-            "parameters": said.parameters,
-            "null_directions": said.null_directions,
-            "equivalent_systems": [family.sentence() for family in said.families],
-            "verdicts": [_plain(verdict) for verdict in said.verdicts],
-        },
-        "coefficients": {
-            n: {"value": v, "standard_error": white[n], "standard_error_coloured": wide[n], "unit": units[n]}
-            for n, v in found.values.items()
-        },
-    }
-    (folder / "identification.json").write_text(to_json(content), encoding="utf-8")
+def _fitted(vehicle: AbstractVehicle, runs: Runs, method: str, where: str) -> Fit:
+    """The fit of the vehicle, read from `where`. **Raises** `InputError` where the model does not run."""
+    # Gauss–Newton by its own name is what `fit` does unasked, and that finds a start where the file's does not run
+    chosen = None if method == "gauss-newton" else METHODS[method.replace("-", "_")]()
+    found = fit(vehicle, runs, method=chosen)
+    if not np.isfinite(float(found.cost)):
+        what = "the model does not run from these values"
+        raise InputError(where, what, "give values that are closer, or another --method")
+    return found
 
 
-def _plain(verdict: Verdict) -> dict:
-    """A verdict as JSON has it, which knows no infinity."""
-    told = dataclasses.asdict(verdict)
-    return told | {"relative_error": verdict.relative_error if np.isfinite(verdict.relative_error) else None}
+def _identified(found: Fit, method: str, where: str) -> Identification:
+    """The fit and what follows from it, as far as it came before an interruption."""
+    assessment, said, coloured, complete = assess(found), None, None, False
+    try:
+        coloured = coloured_covariance(found)
+        said = identifiability(found, assessment)
+        complete = True
+    except KeyboardInterrupt:
+        pass
+    return Identification(found, method, where, assessment, said, coloured, complete)
 
 
-def _show(found: Fit, said: Identifiability, coloured: Coloured) -> None:
-    for sentence in said.sentences():
+def _show(identified: Identification) -> None:
+    terminal.say(f"The fit {identified.assessment.verdict()}.")
+    terminal.table(*identified.channel_table())
+    for sentence in identified.sentences():
         terminal.say(sentence)
-    rows = []
-    white, wide = found.standard_errors, coloured.standard_errors
-    kind = {verdict.name: verdict.kind for verdict in said.verdicts}
-    units = {row.name: unit(row.unit) for row in found.vehicle.layout.free}
-    for name, value in found.values.items():
-        spread = (f"{errors[name]:.2g}" for errors in (white, wide))
-        rows.append((name, f"{value:.6g}", *spread, units[name], kind[name]))
-    terminal.table(("coefficient", "value", "standard error", "if residuals are coloured", "unit", "verdict"), rows)
-    if not bool(found.result == RESULTS.successful):
-        away = f"{float(found.gradient_norm):.2g} standard errors from the optimum"
-        terminal.say(f"Not converged: {RESULTS[found.result]} It is {away}.")
+    terminal.table(*identified.coefficient_table())

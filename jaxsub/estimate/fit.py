@@ -5,7 +5,7 @@ import dataclasses
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..filter.vehicle import unfilterable
 from ..likelihood import Linearised, concentrated_sigma, linearise, residual_outputs
@@ -69,11 +69,24 @@ class Fit(Ended):
     - `model`: the vehicle linearised along the fitted trajectory.
     - `gradient_norm`: largest |∂cost/∂y| in scaled coordinates, relative to the largest curvature's square root: how
       many standard errors the optimum within bounds may still be away.
+    - `pressed`: (p,) -1 for a parameter that presses on its lower bound, 1 on its upper one, 0 for any other.
     """
 
     covariance: Float[Array, "p p"]
     model: Linearised
     gradient_norm: Float[Array, ""]
+    pressed: Float[Array, " p"]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search ended at an optimum."""
+        return bool(self.result == RESULTS.successful)
+
+    @property
+    def at_bound(self) -> dict[str, str]:
+        """Of each parameter that presses on a bound, which: `lower` or `upper`."""
+        sides = zip(self.names, np.asarray(self.pressed), strict=True)
+        return {name: "lower" if side < 0.0 else "upper" for name, side in sides if side}
 
     @property
     def standard_errors(self) -> dict[str, float]:
@@ -204,21 +217,27 @@ def evaluate(ended: Ended) -> Fit:
     if isinstance(ended, Fit):
         return ended
     model = linearise(ended.vehicle, ended.runs, ended.start)
-    covariance, gradient = _statistics(ended.problem, model)
+    covariance, gradient, pressed = _statistics(ended.problem, model)
     told = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
     told["result"] = judged(ended.vehicle, gradient, ended.result)
-    return Fit(**told, covariance=covariance, model=model, gradient_norm=gradient)
+    return Fit(**told, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
 
 
 @eqx.filter_jit
-def _statistics(problem: Problem, model: Linearised) -> tuple[Array, Array]:
-    """Covariance of the free parameters, and the gradient in standard errors."""
+def _statistics(problem: Problem, model: Linearised) -> tuple[Array, Array, Array]:
+    """Covariance of the free parameters, the gradient in standard errors, and which bound each presses on."""
     information, gradient = information_matrix(problem, model)
     rows, values = problem.vehicle.layout.free, problem.vehicle.values()
     at = jnp.array([values[row.name] for row in rows])
     lower, upper = (jnp.array([getattr(row, side) for row in rows]) for side in ("lower", "upper"))
-    away = standard_errors_away(information, gradient, jnp.where(gradient > 0.0, upper - at, at - lower))
-    return inverse_information(information), jnp.max(away, initial=0.0)
+    room = jnp.where(gradient > 0.0, upper - at, at - lower)
+    away = standard_errors_away(information, gradient, room)
+    pressed = jnp.where(is_pressed(information, room), jnp.sign(gradient), 0.0)
+    # others' errors are for what presses on a bound held there; its own is the curvature's, which is no interval
+    covariance = inverse_information(alone(information, pressed != 0.0))
+    own = inverse_information(information)
+    covariance = jnp.where(jnp.diag(pressed != 0.0), own, covariance)
+    return covariance, jnp.max(away, initial=0.0), pressed
 
 
 def inverse_information(information: Float[Array, "p p"]) -> Float[Array, "p p"]:
@@ -237,10 +256,15 @@ def standard_errors_away(
 
     What presses on a bound, with less `room` downhill than matters, stays.
     """
-    pressed = room * jnp.sqrt(jnp.diag(information)) < _MATTERS
+    pressed = is_pressed(information, room)
     covariance = inverse_information(alone(information, pressed))
     step = jnp.abs(covariance @ jnp.where(pressed, 0.0, gradient))
     return step / jnp.sqrt(jnp.maximum(jnp.diag(covariance), 1e-300))
+
+
+def is_pressed(information: Float[Array, "p p"], room: Float[Array, " p"]) -> Bool[Array, " p"]:
+    """Which parameters have less `room` downhill than matters beside their standard errors, others known."""
+    return room * jnp.sqrt(jnp.diag(information)) < _MATTERS
 
 
 def judged(vehicle: AbstractVehicle, away: Float[Array, ""], result: RESULTS) -> RESULTS:

@@ -5,6 +5,7 @@ from .design import Design, design, keeping
 from .design_information import Information, information
 from .design_limits import Limits
 from .equivalence import Equivalent, Family, equivalent_systems
+from .estimates import Estimate, estimates
 from .profile import Profile, profile
 from .rank import Identifiability, Verdict, identifiability, identifiable_subset
 
@@ -12,6 +13,7 @@ __all__ = [
     "Coloured",
     "Design",
     "Equivalent",
+    "Estimate",
     "Family",
     "Identifiability",
     "Information",
@@ -21,6 +23,7 @@ __all__ = [
     "coloured_covariance",
     "design",
     "equivalent_systems",
+    "estimates",
     "identifiability",
     "identifiable_subset",
     "information",

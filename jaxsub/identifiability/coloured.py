@@ -14,7 +14,7 @@ Initial states are eliminated; priors count as observations of their own precisi
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..estimate import Fit, Problem, estimate_disturbance
 from ..likelihood import (
@@ -49,18 +49,19 @@ class Coloured(eqx.Module):
 def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None) -> Coloured:
     """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed.
 
-    The `disturbance` is estimated from the residuals where none is given.
+    The `disturbance` is estimated from the residuals where none is given. Coefficients at a bound are held there.
     """
-    covariance, disturbance = _corrected(fit.problem, fit.model, disturbance)
+    covariance, disturbance = _corrected(fit.problem, fit.model, fit.pressed != 0.0, disturbance)
     return Coloured(covariance, disturbance, fit.names)
 
 
 @eqx.filter_jit
 def _corrected(
-    problem: Problem, model: Linearised, disturbance: Disturbance | None
+    problem: Problem, model: Linearised, held: Bool[Array, " p"], disturbance: Disturbance | None
 ) -> tuple[Float[Array, "p p"], Disturbance]:
     theta, start, residual = whitened_columns(problem, model)
-    precision = problem.prior_std**-2.0
+    # a coefficient at its bound is held there
+    theta, precision = jnp.where(held, 0.0, theta), jnp.where(held, 1.0, problem.prior_std**-2.0)
     own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(start.shape[3])
     gain = jnp.linalg.solve(own, jnp.einsum("rkcs,rkcp->rsp", start, theta))
     # what is left of the columns once the initial states have followed, and what their priors then say
@@ -70,7 +71,7 @@ def _corrected(
     basis, untold = _directions(gram(left) + pinned)
     values = problem.vehicle.values()
     at = [values[row.name] for row in problem.vehicle.layout.free]
-    away = problem.prior_mean - jnp.stack(at) if at else jnp.zeros(0)
+    away = jnp.where(held, 0.0, problem.prior_mean - jnp.stack(at)) if at else jnp.zeros(0)
     pulled = jnp.column_stack([away, basis])
     prior = pulled.T @ (precision[:, None] * pulled)
     # a direction that nothing tells has an empty column, and must not make the matrix of the others singular

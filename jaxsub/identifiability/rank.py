@@ -5,13 +5,26 @@ from typing import Literal
 
 import numpy as np
 
-from ..estimate import Fit
+from ..estimate import Assessment, Fit, assess
 from .directions import FRACTION, Directions, subset
 from .equivalence import Family, equivalent_systems
 from .excitation import Excitation
 
 _SHOWN, _PARTNERS, _SHARE, _NAMED = 0.15, 5, 0.2, 3
-Kind = Literal["identified", "only in combination", "not excited"]
+Kind = Literal[
+    "identified",
+    "only in combination",
+    "not excited",
+    "at its lower bound",
+    "at its upper bound",
+    "not converged",
+    "fit does not explain the runs",
+]
+# what is said once of all coefficients and not of each
+_OF_ALL = {
+    "not converged": "the search did not converge, so no coefficient counts as identified",
+    "fit does not explain the runs": "the fit does not explain the runs, so no coefficient counts as identified",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,7 +34,9 @@ class Verdict:
     **Fields**
 
     - `kind`: `identified`: its standard error is below half its size. `only in combination`: it would be if others were
-      known. `not excited`: it would not be even then.
+      known. `not excited`: it would not be even then. `at its lower bound`, `at its upper bound`: it presses on it. A
+      coefficient that would count as identified is `not converged` where the search did not end at an optimum, and
+      `fit does not explain the runs` where residuals are too large, coloured or spiked.
     - `relative_error`: standard error in its own size, infinite where nothing bounds it.
     - `partners`: the coefficients that it may drift with, the strongest first.
     - `structural`: whether equivalent systems are the reason, so that no input helps.
@@ -37,6 +52,8 @@ class Verdict:
 
     def sentence(self) -> str:
         """The verdict in words."""
+        if self.kind in _OF_ALL or self.kind.startswith("at its"):
+            return f"{self.name}: {self.kind}; {self.remedy}."
         known = "unbounded" if not np.isfinite(self.relative_error) else f"known to {self.relative_error:.0%}"
         if self.kind == "identified":
             return f"{self.name}: identified, {known}."
@@ -70,13 +87,23 @@ class Identifiability:
             terms = " ".join(f"{share:+.2f}·Δ{name}/{name}" for name, share in direction.items())
             wide = f"Open to {spread:.0%} of their size" if np.isfinite(spread) else "Open without limit"
             lines.append(f"{wide}: {terms}")
-        return lines + [verdict.sentence() for verdict in self.verdicts if verdict.kind != "identified"]
+        own = [v.sentence() for v in self.verdicts if v.kind != "identified" and v.kind not in _OF_ALL]
+        of_all = [
+            f"{why[0].upper()}{why[1:]}." for kind, why in _OF_ALL.items() if kind in {v.kind for v in self.verdicts}
+        ]
+        return lines + own + of_all
 
 
-def identifiability(fit: Fit) -> Identifiability:
-    """The directions that a fit's recordings leave open, and a verdict on each coefficient."""
+def identifiability(fit: Fit, assessment: Assessment | None = None) -> Identifiability:
+    """The directions that a fit's recordings leave open, and a verdict on each coefficient.
+
+    `assessment` says whether the fit explains its runs; it is made of the fit where none is given.
+    """
     if not fit.names:
         return Identifiability(0, 0, [], [])
+    if not np.all(np.isfinite(np.asarray(fit.model.theta))):
+        unknown = tuple(Verdict(n, "not converged", np.inf, remedy=_OF_ALL["not converged"]) for n in fit.names)
+        return Identifiability(0, len(fit.names), [], [], unknown)
     directions = Directions.of(fit)
     open_ = np.flatnonzero(directions.open)
     null = []
@@ -84,7 +111,8 @@ def identifiability(fit: Fit) -> Identifiability:
         vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
         null.append({n: round(float(d), 3) for n, d in zip(fit.names, vector, strict=True) if abs(d) > _SHOWN})
     families = tuple(equivalent_systems(fit.vehicle)) if len(open_) else ()
-    verdicts = _verdicts(fit, directions, families)
+    assessment = assess(fit) if assessment is None else assessment
+    verdicts = tuple(_withheld(verdict, fit, assessment) for verdict in _verdicts(fit, directions, families))
     p = len(fit.names)
     return Identifiability(p - len(open_), p, null, directions.uncertainty.tolist(), verdicts, families)
 
@@ -100,12 +128,13 @@ def identifiable_subset(fit: Fit) -> tuple[str, ...]:
 
 
 def _verdicts(fit: Fit, directions: Directions, families: tuple[Family, ...]) -> tuple[Verdict, ...]:
-    errors, alone = directions.relative_errors(), directions.alone()
+    pressed = tuple(i for i, name in enumerate(fit.names) if name in fit.at_bound)
+    errors, alone = directions.relative_errors(pressed), directions.alone()
     if not (errors > FRACTION).any():
         return tuple(Verdict(n, "identified", float(e)) for n, e in zip(fit.names, errors, strict=True))
     rows = np.array([[f.coefficients.get(n, 0.0) for n in fit.names] for f in families]).reshape(-1, len(fit.names))
     rows = rows / directions.size
-    pinned = directions.relative_errors(pinned=rows)
+    pinned = directions.relative_errors(pressed, rows)
     excitation = Excitation.of(fit)
     made = []
     for i, name in enumerate(fit.names):
@@ -124,6 +153,22 @@ def _verdicts(fit: Fit, directions: Directions, families: tuple[Family, ...]) ->
             remedies.append(_separate(directions, i, partners, rows if mine else rows[:0], excitation))
         made.append(Verdict(name, "only in combination", error, partners, bool(mine), "; besides, ".join(remedies)))
     return tuple(made)
+
+
+def _withheld(verdict: Verdict, fit: Fit, assessment: Assessment) -> Verdict:
+    """The verdict, unless the coefficient presses on a bound, or the fit is none that one could count on."""
+    if verdict.name in fit.at_bound:
+        kind: Kind = "at its lower bound" if fit.at_bound[verdict.name] == "lower" else "at its upper bound"
+        remedy = "the optimum lies beyond it: widen the bound, or fix the coefficient and give the reason"
+        return Verdict(verdict.name, kind, np.inf, remedy=remedy)
+    if verdict.kind != "identified":
+        return verdict
+    if not fit.converged:
+        return dataclasses.replace(verdict, kind="not converged", remedy=_OF_ALL["not converged"])
+    if not assessment.explains:
+        kind = "fit does not explain the runs"
+        return dataclasses.replace(verdict, kind=kind, remedy=assessment.reason() or _OF_ALL[kind])
+    return verdict
 
 
 def _mine(families: tuple[Family, ...], rows: np.ndarray, index: int) -> list[Family]:

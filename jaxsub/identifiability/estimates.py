@@ -1,0 +1,57 @@
+"""Each fitted coefficient with its standard errors and what may be said of it."""
+
+import dataclasses
+import math
+
+from ..estimate import Fit
+from .coloured import Coloured
+from .rank import Identifiability
+
+# what stands for a verdict where none was reached
+UNKNOWN = "not asked"
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A fitted coefficient.
+
+    **Fields**
+
+    - `name`, `value`, `unit`: SI.
+    - `standard_error`: allows for coloured and oversized residuals. `standard_error_white`: takes them for white noise
+      of the given σ. None where there is none: at a bound, or where nothing bounds the coefficient.
+    - `verdict`: `identified`, or why not. `remedy`: what would identify it.
+    """
+
+    name: str
+    value: float
+    unit: str
+    standard_error: float | None
+    standard_error_white: float | None
+    verdict: str
+    remedy: str = ""
+
+
+def estimates(fit: Fit, said: Identifiability | None, coloured: Coloured | None) -> list[Estimate]:
+    """The coefficients of a fit; what was not asked, because the command was ended, is None.
+
+    Where the residuals' disturbance could not be estimated, the standard errors for white noise are multiplied by the
+    largest rms of a channel, if that is above one.
+    """
+    verdicts = {verdict.name: verdict for verdict in said.verdicts} if said else {}
+    unit = {row.name: row.unit for row in fit.vehicle.layout.free}
+    white = fit.standard_errors
+    wide = coloured.standard_errors if coloured else {}
+    size = max([1.0, *(rms for rms in fit.rms.values() if math.isfinite(rms))])
+    found = []
+    for name, value in fit.values.items():
+        verdict = verdicts.get(name)
+        none = name in fit.at_bound or not math.isfinite(white[name])
+        if verdict and verdict.kind in ("only in combination", "not excited"):
+            none = none or not math.isfinite(verdict.relative_error)
+        allowed = wide.get(name, math.nan)
+        allowed = allowed if math.isfinite(allowed) else size * white[name]
+        errors = (None, None) if none else (allowed, white[name])
+        kind, remedy = (verdict.kind, verdict.remedy) if verdict else (UNKNOWN, "")
+        found.append(Estimate(name, value, unit[name], *errors, kind, remedy))
+    return found
