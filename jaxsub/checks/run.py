@@ -12,9 +12,11 @@ from ..vehicle import AbstractVehicle, vehicle_findings
 from .channels import Channel, channels_of
 from .duplicates import duplicates
 from .ranges import impossible, sample_interval
+from .repeats import clipped, constant, slow_sensor, stuck
 from .sampling import late_start, pieces
 from .sentinels import sentinels
 from .spans import of_run
+from .spikes import spikes
 from .turning import turning
 
 
@@ -74,12 +76,15 @@ def _run(
     columns = dict(recording.columns)
     for channel in channels:
         values = columns.get(channel.name, np.full(len(recording.times), np.nan))
-        for mend in (sentinels, impossible):
+        findings += constant(recording, channel, values)
+        for mend in (sentinels, impossible, slow_sensor, stuck):
             values, more = mend(recording, channel, values)
             findings += more
-        values, more = turning(recording, channel, values, body)
+        for mend in (spikes, turning):
+            values, more = mend(recording, channel, values, body)
+            findings += more
+        findings += clipped(recording, channel, values)
         columns[channel.name] = values
-        findings += more
     whole = dataclasses.replace(recording, columns=columns)
     findings += [note for channel in channels if channel.role == "measured" for note in late_start(whole, channel)]
     parts, more = pieces(whole, [channel for channel in channels if channel.role != "measured"])

@@ -1,0 +1,74 @@
+"""Single samples far beyond what a channel's own differences allow."""
+
+import numpy as np
+
+from ..findings import Finding
+from ..recording import Recording
+from .channels import ANGLES, Channel
+from .spans import amount, at_rows, counted
+
+_ROBUST = 1.4826  # standard deviations of a normal density in its median absolute deviation
+_DEVIATIONS = 8.0
+_USUAL = 4.0  # times the 95th percentile of the differences
+_SIGMAS = 10.0
+_QUANTA = 6.0
+_RETURN = 0.6  # the lesser of rise and fall over the larger: what falls slower is the answer to a push
+_FEW = 0.02  # of the samples: more are how the channel is
+_WIDTHS = (1, 2)  # rows that a spike may last
+
+
+def spikes(recording: Recording, channel: Channel, values: np.ndarray, body: bool) -> tuple[np.ndarray, list[Finding]]:
+    """`values` (samples,) without spikes, and a warning.
+
+    A spike leaves the samples before and after it, on one side, by more than 8 robust standard deviations and 4 times
+    the 95th percentile of the channel's differences, 10 σ of its sensor and 6 steps of its resolution. A step does not
+    come back, so it is none. A measured spike is masked, a prescribed one interpolated; of a held input, which may be
+    a pulse, nothing is said.
+    """
+    rows = np.flatnonzero(np.isfinite(values))
+    if channel.role == "held input" or rows.size < 20:
+        return values, []
+    there = values[rows]
+    chosen_rows, typical = _found(there, channel.sigma, body and channel.quantity in ANGLES)
+    if not chosen_rows.size:
+        return values, []
+    chosen = np.zeros(values.shape, bool)
+    chosen[rows[chosen_rows]] = True
+    good = np.isfinite(values) & ~chosen
+    around = np.interp(recording.times, recording.times[good], values[good])
+    size = float(np.max(np.abs(values - around)[chosen]))
+    done = "masked" if channel.role == "measured" else "interpolated"
+    what = (
+        f"{counted(chosen, values)} {done} as spikes of up to {amount(size, channel.unit)};"
+        f" its differences are {amount(typical, channel.unit)}"
+    )
+    finding = at_rows("spike", "warning", recording, channel, chosen, what, "see whether the sensor was disturbed")
+    return np.where(chosen, np.nan if channel.role == "measured" else around, values), [finding]
+
+
+def _found(values: np.ndarray, sigma: float, angle: bool) -> tuple[np.ndarray, float]:
+    """Indices of the spikes among `values` (n,), and the usual size of its differences."""
+    differences = _short_way(np.diff(values), angle)
+    size = np.abs(differences)
+    deviation = _ROBUST * float(np.median(np.abs(differences - np.median(differences))))
+    moving = size[size > 0.0]
+    if not moving.size:
+        return np.array([], int), 0.0
+    quantum = float(moving.min()) if moving.size < 0.5 * size.size else 0.0
+    usual = float(np.percentile(size, 95.0))
+    limit = max(_DEVIATIONS * deviation, _USUAL * usual, _SIGMAS * sigma, _QUANTA * quantum)
+    chosen = np.zeros(values.shape, bool)
+    # at the ends there is one side alone, on which a step looks the same
+    for width in _WIDTHS:
+        before, after = values[width:-width] - values[: -2 * width], values[width:-width] - values[2 * width :]
+        before, after = _short_way(before, angle), _short_way(after, angle)
+        less, more = np.minimum(np.abs(before), np.abs(after)), np.maximum(np.abs(before), np.abs(after))
+        chosen[width:-width] |= (before * after > 0.0) & (less > width * limit) & (less > _RETURN * more)
+    index = np.flatnonzero(chosen)
+    # a pulse that many samples share is a motion; so is what is there throughout
+    return (index if index.size <= max(_FEW * values.size, 1.0) else index[:0]), float(np.median(moving))
+
+
+def _short_way(changes: np.ndarray, angle: bool) -> np.ndarray:
+    """Changes of an angle without whole turns."""
+    return changes - 2.0 * np.pi * np.round(changes / (2.0 * np.pi)) if angle else changes
