@@ -63,10 +63,18 @@ def _found(values: np.ndarray, sigma: float, angle: bool) -> tuple[np.ndarray, f
         before, after = values[width:-width] - values[: -2 * width], values[width:-width] - values[2 * width :]
         before, after = _short_way(before, angle), _short_way(after, angle)
         less, more = np.minimum(np.abs(before), np.abs(after)), np.maximum(np.abs(before), np.abs(after))
-        chosen[width:-width] |= (before * after > 0.0) & (less > width * limit) & (less > _RETURN * more)
+        out = (before * after > 0.0) & (less > width * limit) & (less > _RETURN * more)
+        # a motion rises to its peak and falls from it over several samples
+        out[1:-1] &= _foot(size, width) < _RETURN / 2.0 * less[1:-1]
+        chosen[width:-width] |= out
     index = np.flatnonzero(chosen)
     # a pulse that many samples share is a motion; so is what is there throughout
     return (index if index.size <= max(_FEW * values.size, 1.0) else index[:0]), float(np.median(moving))
+
+
+def _foot(size: np.ndarray, width: int) -> np.ndarray:
+    """The larger difference of the samples beyond those `width` rows before and after, of all but the ends."""
+    return np.maximum(size[: -2 * width - 1], size[2 * width + 1 :])
 
 
 def _short_way(changes: np.ndarray, angle: bool) -> np.ndarray:
