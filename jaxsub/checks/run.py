@@ -8,8 +8,9 @@ import numpy as np
 from ..errors import InputError
 from ..findings import Finding
 from ..recording import Recording
-from ..vehicle import AbstractVehicle, vehicle_findings
+from ..vehicle import AbstractVehicle, Layout, vehicle_findings
 from .channels import Channel, channels_of
+from .consistency import consistency
 from .duplicates import duplicates
 from .ranges import impossible, sample_interval
 from .repeats import clipped, constant, slow_sensor, stuck
@@ -47,13 +48,12 @@ def check(vehicle: AbstractVehicle, recordings: Sequence[Recording], held_out: S
     a run is cut where time has a hole while an input moved; each of these is a finding too.
     """
     layout = vehicle.layout
-    channels = channels_of(layout)
-    body = layout.kind == "submerged-body"
+    speed = float(vehicle.own_values().get("speed", 0.0))
     every = [*recordings, *held_out]
     known = {name for recording in every for name in recording.columns}
     mended, found = [], [*vehicle_findings(vehicle, layout.name), *duplicates(recordings, held_out)]
     for recording in every:
-        parts, findings = _run(recording, channels, known, body)
+        parts, findings = _run(recording, layout, known, speed)
         mended.append(parts)
         found += findings
     order = ("error", "warning", "note")
@@ -63,10 +63,9 @@ def check(vehicle: AbstractVehicle, recordings: Sequence[Recording], held_out: S
     return Checked(tuple(ranked), flat(mended[:count]), flat(mended[count:]))
 
 
-def _run(
-    recording: Recording, channels: Sequence[Channel], known: set[str], body: bool
-) -> tuple[list[Recording], list[Finding]]:
+def _run(recording: Recording, layout: Layout, known: set[str], speed: float) -> tuple[list[Recording], list[Finding]]:
     """One run as it will be used, in pieces, and what was found in it."""
+    channels, body = channels_of(layout), layout.kind == "submerged-body"
     findings = list(recording.findings)
     absent = _columns(recording, channels, known)
     findings += absent
@@ -86,6 +85,7 @@ def _run(
         findings += clipped(recording, channel, values)
         columns[channel.name] = values
     whole = dataclasses.replace(recording, columns=columns)
+    findings += consistency(recording, layout, columns, speed)
     findings += [note for channel in channels if channel.role == "measured" for note in late_start(whole, channel)]
     parts, more = pieces(whole, [channel for channel in channels if channel.role != "measured"])
     findings += more

@@ -22,6 +22,7 @@ VEHICLES = {
 SAMPLES = {"remus": 300, "body": 300}
 # the catalogue's REMUS is unstable in open loop, and a run of it has to be short
 STEPS = {"remus": 0.01}
+AMPLITUDES = {"remus": 0.03}
 
 
 @functools.cache
@@ -34,7 +35,8 @@ def clean(name: str, seed: int = 0) -> Recording:
     """A run that the vehicle of that name made, with its sensors' noise."""
     vehicle = vehicle_named(name)
     count = SAMPLES.get(name, 600)
-    return synthetic(vehicle, [driven(vehicle, STEPS.get(name, 0.1) * np.arange(count), seed)], seed=seed)[0]
+    times = STEPS.get(name, 0.1) * np.arange(count)
+    return synthetic(vehicle, [driven(vehicle, times, seed, AMPLITUDES.get(name, 0.1))], seed=seed)[0]
 
 
 def changed(recording: Recording, **columns: np.ndarray) -> Recording:
