@@ -207,9 +207,11 @@ def augmented_predict(
     x, *jacobians = linearised(after, jnp.zeros(s, state.x.dtype), state.theta)
     # of the state's n numbers; of its ways to change
     push = jax.linearize(lambda moved: process.apart(moved, x), x)[1]
-    F, by_theta = jnp.split(jax.vmap(push, 1, 1)(jnp.concatenate(jacobians, axis=1)), [s], axis=1)
-    whole = jnp.block([[F, by_theta], [jnp.zeros_like(by_theta.T), jnp.eye(p, dtype=F.dtype)]])
-    return x, filter.form.predict(state.joint, whole, _of_state(G, p)), F
+    by_all = jax.vmap(push, 1, 1)(jnp.concatenate(jacobians, axis=1))
+    # The parameters' columns are not sliced off: with no parameters that is an empty slice of a concatenation, at which
+    # XLA's front end on one core drops the calling convention of every LAPACK routine in the program.
+    whole = jnp.concatenate([by_all, jnp.eye(p, s + p, k=s, dtype=by_all.dtype)])
+    return x, filter.form.predict(state.joint, whole, _of_state(G, p)), by_all[:, :s]
 
 
 def augmented_widened(filter: AbstractFilter, state: FilterState, G: Float[Array, "s m"]) -> Float[Array, "q q"]:
