@@ -16,8 +16,9 @@ from .base import AbstractVehicle, Layout, timed
 class Mechanism(AbstractVehicle):
     r"""$\sum_j I_{ij}\ddot q_j + D_{ij}\dot q_j + K_{ij}q_j = \sum_a B_{ia}u_a + F_i$ for n coordinates q.
 
-    Names: `I_q`, `D_q`, `K_q` on the diagonal, `I_q_s` off it (symmetric); `B_q_drive` for the actuator `drive`;
-    `F_q` for a constant. Absent means 0, for `I_q` 1.
+    Names: `I_q`, `D_q`, `K_q` on the diagonal, `I_q_s`, `D_q_s`, `K_q_s` off it; `B_q_drive` for the actuator `drive`;
+    `F_q` for a constant. Absent means 0, for `I_q` 1. A coupling given on one side only (`D_q_s`) stands for its twin
+    (`D_s_q`) too, so it acts on both equations; `D_s_q = 0` beside it leaves the one.
 
     **Fields**
 

@@ -1,6 +1,8 @@
 """Whatever a vehicle file holds, it is read as a vehicle that runs, or refused in one line that names the file."""
 
 import copy
+import dataclasses
+import math
 import tomllib
 
 import jax
@@ -9,8 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from jaxsub.effects import options
 from jaxsub.errors import InputError
-from jaxsub.vehicle import read_vehicle, vehicle_from
+from jaxsub.vehicle import read_vehicle, vehicle_from, vehicle_text
 
 BODY = """
 schema = 1
@@ -80,6 +83,23 @@ def is_read_or_refused(make, name):
         assert len(str(error).splitlines()) == 1
     else:
         runs(vehicle)
+        comes_back(vehicle)
+
+
+def comes_back(vehicle):
+    """Raises where the vehicle that its own file describes is another."""
+    text = vehicle_text(vehicle)
+    again = vehicle_from(tomllib.loads(text), "again.toml")
+    assert dataclasses.replace(again.layout, parameters=()) == dataclasses.replace(vehicle.layout, parameters=())
+    rows, came = ({row.name: row for row in v.layout.parameters} for v in (vehicle, again))
+    assert {name: row for name, row in came.items() if name in rows} == rows
+    # what followed from other numbers is written too
+    assert not any(row.free for name, row in came.items() if name not in rows)
+    assert [(e.label, options(e)) for e in again.effects] == [(e.label, options(e)) for e in vehicle.effects]
+    before, after = vehicle.values(), again.values()
+    assert before.keys() == after.keys()
+    assert all(float(before[name]) == float(after[name]) for name in before)
+    assert vehicle_text(again) == text
 
 
 def runs(vehicle):
@@ -140,10 +160,8 @@ def places(data, path=()):
         yield from places(child, (*path, key))
 
 
-@pytest.mark.parametrize("text", [BODY, RIG], ids=["body", "rig"])
-@fuzz
-@given(data=st.data())
-def test_a_file_with_other_values_in_it(text, data):
+def with_other_values(text, data):
+    """The tree of a file with one or two of its values replaced."""
     tree = tomllib.loads(text)
     for path in data.draw(st.lists(st.sampled_from(list(places(tree))), min_size=1, max_size=2)):
         *above, last = path
@@ -154,4 +172,57 @@ def test_a_file_with_other_values_in_it(text, data):
             table[last] = copy.deepcopy(data.draw(trees))
         except (KeyError, IndexError, TypeError):  # an earlier change took the place away
             continue
+    return tree
+
+
+@pytest.mark.parametrize("text", [BODY, RIG], ids=["body", "rig"])
+@fuzz
+@given(data=st.data())
+def test_a_file_with_other_values_in_it(text, data):
+    tree = with_other_values(text, data)
     is_read_or_refused(lambda: vehicle_from(tree, "vehicle.toml"), "vehicle.toml")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("text", [BODY, RIG], ids=["body", "rig"])
+@settings(fuzz, max_examples=10_000)
+@given(data=st.data())
+def test_many_files_with_other_values_in_them(text, data):
+    tree = with_other_values(text, data)
+    is_read_or_refused(lambda: vehicle_from(tree, "vehicle.toml"), "vehicle.toml")
+
+
+sizes = st.floats(-1e6, 1e6).filter(lambda x: x == 0 or abs(x) > 1e-6)
+entries = st.fixed_dictionaries(
+    {"value": sizes},
+    optional={"fixed": st.booleans(), "prior_std": st.floats(1e-3, 1e3), "bounds": st.just([-math.inf, 2e6])},
+) | sizes  # fmt: skip
+
+
+@fuzz
+@given(
+    numbers=st.dictionaries(st.sampled_from(["X_u", "Z_w", "M_q", "Z_q", "X_0", "Z_delta_r", "M_udot"]), entries),
+    mass=st.floats(1e-3, 1e6), arm=st.lists(sizes, min_size=3, max_size=3),
+    name=st.text(st.characters(categories=["L", "N", "P", "S"]), min_size=1, max_size=20),
+    mean=sizes, free=st.booleans(),
+)  # fmt: skip
+def test_what_is_written_is_read(numbers, mass, arm, name, mean, free):
+    tree = tomllib.loads(BODY)
+    tree["coefficients"], tree["name"] = numbers, name
+    tree["body"]["mass"] = {"value": mass, "free": free, "prior_std": 2.0, "prior_mean": mean}
+    tree["outputs"]["az"]["lever_arm"] = arm
+    try:
+        vehicle = vehicle_from(tree, "vehicle.toml")
+    except InputError as error:
+        assert "not positive definite" in str(error)
+        return
+    rows, values = {row.name: row for row in vehicle.layout.parameters}, vehicle.values()
+    assert (vehicle.layout.name, vehicle.layout.outputs[0].lever_arm) == (name, tuple(arm))
+    assert (rows["mass"].prior_mean, rows["mass"].prior_std, rows["mass"].free) == (mean, 2.0, free)
+    for symbol, entry in numbers.items():
+        entry = entry if isinstance(entry, dict) else {"value": entry}
+        assert float(values[symbol]) == entry["value"]
+        assert rows[symbol].free != entry.get("fixed", False)
+        assert rows[symbol].prior_std == entry.get("prior_std", math.inf)
+        assert [rows[symbol].lower, rows[symbol].upper] == entry.get("bounds", [-math.inf, math.inf])
+    comes_back(vehicle)
