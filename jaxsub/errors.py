@@ -23,6 +23,14 @@ class InputError(ValueError):
         return InputError(f"{place}: {where}", what, remedy)
 
 
+class OutputError(InputError):
+    """A path could not be written, once the work had begun; the command line prints it as one line and exits with 1."""
+
+    def within(self, place: str) -> "OutputError":
+        """The same: the path says where."""
+        return self
+
+
 def require_known(kind: str, names: Iterable[str], known: Iterable[str], owner: str) -> None:
     """Every one of `names` is `known` to `owner`. **Raises** `InputError` with a hint for the first that is not."""
     known = tuple(known)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ..errors import InputError
+from ..errors import InputError, OutputError
 from .options import common
 
 _PATH = click.Path(path_type=Path)
@@ -168,7 +168,7 @@ def main() -> None:
     try:
         app(standalone_mode=False, prog_name="jaxsub")
     except InputError as error:
-        _stop(str(error), 2)
+        _stop(str(error), 1 if isinstance(error, OutputError) else 2)
     except click.UsageError as error:
         _stop(f"{' '.join(error.format_message().split())}; see jaxsub --help", 2)
     except (KeyboardInterrupt, click.Abort) as error:

@@ -17,7 +17,7 @@ from ..recording import Recording
 from ..report import draw_checked_runs
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
-from .output import fresh_folder, refuse_existing
+from .output import fresh_folder, paths_of, require_replaceable
 from .runs import load_run, repeated_paths
 
 
@@ -34,8 +34,9 @@ def run(
     A run that cannot be read is a finding like others. Exits with 2 where one finding is an error.
     """
     session.start()
+    inputs = paths_of(vehicle_path, *runs, *held_out, columns)
     if out is not None:
-        refuse_existing(out, overwrite)
+        require_replaceable(out, overwrite, inputs)
     vehicle = read_vehicle(vehicle_path)
     unread: list[Finding] = repeated_paths(runs, held_out)
     read = [_read(path, vehicle, columns, unread) for path in runs]
@@ -48,7 +49,7 @@ def run(
     checked = dataclasses.replace(checked, findings=(*unread, *later))
     content = _content(vehicle, checked)
     if out is not None:
-        with fresh_folder(out, overwrite) as folder, terminal.progress("drawing"):
+        with fresh_folder(out, overwrite, inputs) as folder, terminal.progress("drawing"):
             _write(vehicle, [*recordings, *held], checked, content, folder)
     terminal.emit(content, lambda: _show(vehicle, checked))
     terminal.count(checked.findings)

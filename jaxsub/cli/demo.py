@@ -17,7 +17,7 @@ from ..vehicle import AbstractVehicle, read_vehicle, write_vehicle
 from ..vehicle.catalogue import nps_auv_ii
 from . import session, terminal
 from .diagnose import show, write_diagnosis
-from .output import fresh_folder, refuse_existing
+from .output import fresh_folder
 from .runs import load_runs
 
 _SAMPLES, _INTERVAL, _RUNS = 800, 0.2, 3
@@ -43,7 +43,6 @@ def concealable(vehicle: AbstractVehicle) -> list[AbstractEffect]:
 def run(out: Path, seed: int, overwrite: bool) -> None:
     """Conceal an effect chosen by `seed` in recordings, then diagnose them from their files like a user's own."""
     session.start()
-    refuse_existing(out, overwrite)
     with fresh_folder(out, overwrite) as folder:
         concealed = make_files(folder, seed)
         vehicle = read_vehicle(folder / "vehicle.toml")

@@ -16,7 +16,7 @@ from ..recording import Recording, hold_out, save
 from ..report import write_report
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
 from . import session, terminal
-from .output import fresh_folder, refuse_existing
+from .output import fresh_folder, paths_of, require_replaceable
 from .runs import load_train_and_test
 
 _NEXT = "next_manoeuvre.csv"
@@ -38,12 +38,13 @@ def run(
     `columns` says what to take.
     """
     session.start()
-    refuse_existing(out, overwrite)
+    inputs = paths_of(vehicle_path, *runs, *held, script, columns)
+    require_replaceable(out, overwrite, inputs)
     own = () if script is None else from_script(script)
     vehicle = read_vehicle(vehicle_path, own)
     recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
     train, judged = (recordings, unseen) if held else hold_out(recordings)
-    with fresh_folder(out, overwrite) as folder:
+    with fresh_folder(out, overwrite, inputs) as folder:
         diagnosis = write_diagnosis(vehicle, train, judged, folder, (*vocabulary(), *own), manoeuvre)
     terminal.emit(diagnosis.to_json(), lambda: show(diagnosis, out))
 

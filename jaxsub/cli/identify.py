@@ -14,7 +14,7 @@ from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
 from .identification import Identification
-from .output import fresh_folder, refuse_existing
+from .output import fresh_folder, paths_of
 from .runs import load_runs
 
 # the shell's exit code of a command that SIGINT ended
@@ -36,23 +36,22 @@ def run(
     The verdict is shown before anything is written. What is interrupted after the fit keeps the fit.
     """
     session.start()
-    refuse_existing(out, overwrite)
-    vehicle = read_vehicle(vehicle_path)
-    require_free(vehicle, str(vehicle_path))
-    recordings = load_runs(runs, vehicle, columns)
-    with terminal.progress(f"identifying {vehicle.layout.name}") as told:
-        told(f"fitting by {method}")
-        found = _fitted(vehicle, batch(vehicle, recordings), method, str(vehicle_path))
-        told("asking what the recordings identify")
-        identified = _identified(found, method, ", ".join(map(str, runs)))
-    terminal.emit(identified.to_json(), lambda: _show(identified))
-    terminal.warn(identified.findings)
-    with fresh_folder(out, overwrite) as folder:
+    with fresh_folder(out, overwrite, paths_of(vehicle_path, *runs, columns)) as folder:
+        vehicle = read_vehicle(vehicle_path)
+        require_free(vehicle, str(vehicle_path))
+        recordings = load_runs(runs, vehicle, columns)
+        with terminal.progress(f"identifying {vehicle.layout.name}") as told:
+            told(f"fitting by {method}")
+            found = _fitted(vehicle, batch(vehicle, recordings), method, str(vehicle_path))
+            told("asking what the recordings identify")
+            identified = _identified(found, method, ", ".join(map(str, runs)))
+        terminal.emit(identified.to_json(), lambda: _show(identified))
+        terminal.warn(identified.findings)
         identified.write(folder)
         if drawn and identified.complete:
             with terminal.progress(f"identifying {vehicle.layout.name}") as told:
                 told("drawing from the posterior")
-                posterior(found).to_netcdf(folder / "posterior.nc", engine="h5netcdf")
+                (folder / "posterior.nc").write_bytes(posterior(found).to_netcdf(engine="h5netcdf"))
     if not identified.complete:
         terminal.console.print(f"jaxsub: interrupted after the fit; {out} holds the fit and what followed it so far")
         sys.exit(_INTERRUPTED)

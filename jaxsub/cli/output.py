@@ -1,33 +1,178 @@
-"""Results appear whole or not at all."""
+"""Results of commands: they appear whole or not at all, and replace only what jaxsub wrote."""
 
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import errno
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import InputError
+import click
+
+from ..errors import InputError, OutputError
+from ..storage import Manifest, place, scratch
+from ..storage.whole import flush
+
+_ANOTHER = "choose another --out"
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.ENAMETOOLONG)
 
 
-def refuse_existing(out: Path, overwrite: bool) -> None:
-    """Raise `InputError` where `out` exists and may not be replaced, or its parent cannot hold it."""
-    if out.exists() and not overwrite:
-        raise InputError(str(out), "already exists", "choose another --out or add --overwrite")
-    parent = out.resolve().parent
-    if parent.exists() and not parent.is_dir():
-        raise InputError(str(out), f"{parent} is not a folder", "choose another --out")
+def paths_of(*given: Path | None) -> list[Path]:
+    """The paths among arguments of which some may be absent."""
+    return [path for path in given if path is not None]
+
+
+def require_replaceable(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
+    """Raise `InputError` unless a command may write to `out`.
+
+    Refused are a link, an input of the command, a folder that holds one or the current folder, whatever exists without
+    `overwrite`, with it whatever a manifest does not list as it is (`storage.manifest`), and a folder that cannot be
+    written.
+    """
+    try:
+        require_apart(out, inputs)
+        if os.path.lexists(out):
+            if not overwrite:
+                raise InputError(str(out), "already exists", f"{_ANOTHER} or add --overwrite")
+            _require_ours(out)
+        parent = next(path for path in out.absolute().parents if os.path.lexists(path))
+        if not parent.is_dir():
+            raise InputError(str(out), f"{parent} is not a folder", _ANOTHER)
+        if not os.access(parent, os.W_OK | os.X_OK):
+            raise InputError(str(out), f"{parent} cannot be written", _ANOTHER)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(str(out).replace("\0", "\\0"), f"cannot be used ({_reason(error)})", _ANOTHER) from error
+
+
+def require_apart(out: Path, inputs: Sequence[Path]) -> None:
+    """Raise `InputError` for a link, an input, or a folder that holds an input or the current folder."""
+    if out.is_symlink():
+        raise InputError(str(out), "is a link", "give --out the path that it leads to, or another")
+    at = out.resolve()
+    for path in inputs:
+        if out.exists() and path.exists() and out.samefile(path):
+            raise InputError(str(out), f"is the input {path}", _ANOTHER)
+        if at in (path.resolve(), path.absolute()):
+            raise InputError(str(out), f"is the input {path}", _ANOTHER)
+        if at in (*path.resolve().parents, *path.absolute().parents):
+            raise InputError(str(out), f"holds the input {path}", _ANOTHER)
+    here = Path.cwd()
+    if at == here or at in here.parents:
+        raise InputError(str(out), "is the current folder or holds it", _ANOTHER)
+
+
+def _require_ours(out: Path) -> None:
+    """Raise `InputError` unless all that is at `out` was written by jaxsub and is as it was written."""
+    remedy = f"{_ANOTHER} or remove it yourself"
+    manifest = Manifest.of_folder(out) if out.is_dir() else Manifest.of_file(out)
+    if not manifest.exists():
+        what = f"was not written by jaxsub: there is no manifest {manifest.path}"
+        raise InputError(str(out), f"{what}, and --overwrite replaces nothing else", remedy)
+    other = manifest.foreign() if out.is_dir() else None if manifest.lists(out) else out
+    if other is not None:
+        what = "was not written by jaxsub or has changed since, and --overwrite replaces nothing else"
+        raise InputError(str(other), what, remedy)
 
 
 @contextmanager
-def fresh_folder(out: Path, overwrite: bool) -> Iterator[Path]:
-    """A temporary folder beside `out` that takes its place when the block ends well, and vanishes when it does not."""
-    refuse_existing(out, overwrite)
-    parent = out.resolve().parent
-    parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=parent, prefix=".jaxsub-") as scratch:
-        folder = Path(scratch) / out.name
-        folder.mkdir()
-        yield folder
-        if out.exists():
-            out.rename(Path(scratch) / "replaced")
-        shutil.move(folder, out)
+def fresh_folder(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Iterator[Path]:
+    """A folder to write results to, which takes the place of `out` when the block ends well and vanishes otherwise.
+
+    It gets the manifest of what was written. `inputs` are the files that the command reads.
+
+    **Raises** `InputError` where `out` may not be replaced (`require_replaceable`), where another process writes there
+    and where nothing can be written there; `OutputError` where writing fails later.
+    """
+    with _beside(out, overwrite, inputs) as folder:
+        new = folder / "new" / out.resolve().name
+        new.mkdir(parents=True)
+        with _told_of(new, out):
+            yield new
+            manifest = Manifest.of_folder(new)
+            manifest.begin(_command())
+            manifest.add_all()
+            _put(new, out, folder, overwrite)
+
+
+@contextmanager
+def fresh_file(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Iterator[Path]:
+    """A path to write one file to, which takes the place of `out` when the block ends well; as `fresh_folder`.
+
+    Its manifest is the file `.NAME.jaxsub.jsonl` beside it.
+    """
+    if out.is_dir() and not out.is_symlink():
+        raise InputError(str(out), "is a folder", "give --out a file")
+    manifest = Manifest.of_file(out)
+    with _beside(out, overwrite, inputs) as folder:
+        new = folder / out.name
+        with _told_of(new, out):
+            yield new
+            flush(new)
+            manifest.begin(_command())
+            manifest.add(out, new)
+            _put(new, out, folder, overwrite)
+
+
+@contextmanager
+def _beside(out: Path, overwrite: bool, inputs: Sequence[Path]) -> Iterator[Path]:
+    """A scratch folder beside `out`, whose parents are made, and removed again where nothing came to be in them."""
+    require_replaceable(out, overwrite, inputs)
+    at = out.absolute()
+    made = [path for path in at.parents if not path.exists()]
+    try:
+        try:
+            at.parent.mkdir(parents=True, exist_ok=True)
+            holding = scratch(at)
+            folder = holding.__enter__()
+        except OSError as error:
+            raise InputError(str(out), f"cannot be written ({_reason(error)})", _ANOTHER) from error
+        try:
+            yield folder
+        finally:
+            holding.__exit__(None, None, None)
+    finally:
+        for path in made:
+            with suppress(OSError):
+                path.rmdir()
+
+
+@contextmanager
+def _told_of(new: Path, out: Path) -> Iterator[None]:
+    """Failures to write `new` as an `OutputError`, and errors about `new` as such about `out`."""
+    try:
+        yield
+    except InputError as error:
+        where, what, remedy = error.parts
+        if str(new) not in where:
+            raise
+        raise type(error)(where.replace(str(new), str(out)), what, remedy) from error
+    except OSError as error:
+        written = str(error.filename or "")
+        if error.errno not in _UNWRITABLE and not written.startswith(str(new)):
+            raise
+        where = written.replace(str(new), str(out)) if written.startswith(str(new)) else str(out)
+        raise OutputError(where, f"cannot be written ({_reason(error)})", f"make room there or {_ANOTHER}") from error
+
+
+def _put(new: Path, out: Path, folder: Path, overwrite: bool) -> None:
+    """Move `new` to `out`, or beside it where `out` has become something that may not be replaced."""
+    try:
+        require_replaceable(out, overwrite)
+    except InputError as error:
+        other = next(path for i in range(1, 10**6) if not os.path.lexists(path := out.with_name(f"{out.name}-{i}")))
+        new.rename(other)
+        where, what, _ = error.parts
+        raise OutputError(
+            where, f"{what}; it came there or changed meanwhile", f"the results are in {other}"
+        ) from error
+    place(new, out, folder)
+
+
+def _command() -> str:
+    context = click.get_current_context(silent=True)
+    return context.info_name or "" if context else ""
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)

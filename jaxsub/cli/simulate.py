@@ -18,7 +18,7 @@ from ..report.text import unit
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
-from .output import refuse_existing
+from .output import fresh_file, paths_of, require_replaceable
 from .runs import load_run
 
 Start = Literal["rest", "recorded", "estimated"]
@@ -38,7 +38,8 @@ def run(
     most probable, as `diagnose` and `identify` estimate it. Of a log, the file at `columns` says what to take.
     """
     session.start()
-    refuse_existing(out, overwrite)
+    inputs = paths_of(vehicle_path, run_path, columns)
+    require_replaceable(out, overwrite, inputs)
     vehicle = read_vehicle(vehicle_path)
     recording = load_run(run_path, vehicle, columns)
     terminal.warn(recording.findings)
@@ -62,7 +63,8 @@ def run(
         "findings": [finding.to_json() for finding in (*recording.findings, *findings)],
     }
     terminal.emit(content, lambda: show(began, content["initial_state"], fit))
-    save(answer(vehicle, recording, np.asarray(shown)[0], out), out)
+    with fresh_file(out, overwrite, inputs) as path:
+        save(answer(vehicle, recording, np.asarray(shown)[0], out), path)
 
 
 def with_every_channel(recording: Recording, vehicle: AbstractVehicle) -> Recording:

@@ -17,7 +17,7 @@ from ..sweep import Plan, answered, check_folder, summarised
 from ..sweep import sweep as run_sweep
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
-from .output import refuse_existing
+from .output import require_apart, require_replaceable
 from .runs import load_runs
 
 _TOGETHER = "all"
@@ -46,9 +46,10 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
     With `overwrite` whatever is there goes, once everything else is found to be in order.
     """
     session.start(long=True)
-    refuse_existing(out, True)
+    require_apart(out, [asked.vehicle, *asked.others, *asked.runs])
     plan = make_plan(asked)
     if overwrite:
+        require_replaceable(out, overwrite)
         plan = plan.settled()
         _remove(out)
     else:

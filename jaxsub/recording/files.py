@@ -1,14 +1,13 @@
 """Recordings as files whose headers are `name` (SI) or `name[unit]`: CSV and its like, Parquet, NetCDF and more."""
 
 import os
-import tempfile
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
 import numpy as np
 
-from jaxsub.errors import InputError
+from jaxsub.errors import InputError, OutputError
 from jaxsub.recording.archive import MARK, extracted, split_member
 from jaxsub.recording.frames import recorded, to_pandas, to_xarray
 from jaxsub.recording.layout import with_brackets
@@ -21,6 +20,7 @@ from jaxsub.recording.reading import Contents, require_file
 from jaxsub.recording.recording import Recording
 from jaxsub.recording.text import read_text
 from jaxsub.recording.workbook import read_workbook
+from jaxsub.storage import written_whole
 from jaxsub.units import split_header
 
 T = TypeVar("T")
@@ -94,11 +94,10 @@ def save(recording: Recording, path: str | os.PathLike[str], units: Units | None
     write = _of_suffix(_WRITERS, path, str(path))
     recording.in_units(units or {})  # refuses a wrong unit before anything is written
     try:
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".jaxsub-") as folder:
-            write(Path(folder) / path.name, recording, units or {})
-            os.replace(Path(folder) / path.name, path)
+        with written_whole(path) as beside:
+            write(beside, recording, units or {})
     except OSError as error:
-        raise InputError(str(path), f"cannot be written ({error.strerror or error})", "check its folder") from error
+        raise OutputError(str(path), f"cannot be written ({error.strerror or error})", "check its folder") from error
 
 
 def _of_suffix(known: Mapping[str, T], path: Path, source: str) -> T:
@@ -128,7 +127,8 @@ def _write_parquet(path: Path, recording: Recording, units: Units) -> None:
 
 
 def _write_netcdf(path: Path, recording: Recording, units: Units) -> None:
-    to_xarray(recording, units).to_netcdf(path, engine="h5netcdf")
+    # through memory: HDF5 prints its own errors where a disk is full
+    path.write_bytes(to_xarray(recording, units).to_netcdf(engine="h5netcdf"))
 
 
 ARCHIVE = ".zip"

@@ -7,15 +7,25 @@ from typing import Any
 import tomlkit
 
 from ..effects import AbstractEffect, options, parameter_table
+from ..errors import OutputError
 from ..parameters import Parameter
+from ..storage import written_whole
 from .base import AbstractVehicle
 from .build import BODY_KEYS, VECTORS
 from .submerged_body import SubmergedBody
 
 
 def write_vehicle(vehicle: AbstractVehicle, path: str | Path, comment: str = "") -> None:
-    """Write `vehicle` so that `read_vehicle` gives it back, to the last digit."""
-    Path(path).write_text(vehicle_text(vehicle, comment), encoding="utf-8")
+    """Write `vehicle` so that `read_vehicle` gives it back, to the last digit.
+
+    An older file stays as it was until the new one is whole. **Raises** `OutputError` where it cannot be written.
+    """
+    path = Path(path)
+    try:
+        with written_whole(path) as beside:
+            beside.write_text(vehicle_text(vehicle, comment), encoding="utf-8")
+    except OSError as error:
+        raise OutputError(str(path), f"cannot be written ({error.strerror or error})", "check its folder") from error
 
 
 def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:

@@ -1,0 +1,132 @@
+"""Scratch folders: where a process writes what is to take a path's place, one process at a time for each path.
+
+The folder `.jaxsub-KEY-PID-HOST` lies beside the path; KEY is a digest of the path's name. Its file `lock` is locked as
+long as the process lives, so that the kernel tells a dead owner from a live one, also where numbers of processes are
+used again or containers share a host's name.
+"""
+
+import contextlib
+import hashlib
+import os
+import re
+import shutil
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # Windows has none: owners there count as alive while their number is in use
+    fcntl = None
+
+REPLACED = "replaced"
+_LOCK = "lock"
+_NAME = re.compile(r"\.jaxsub-(?P<key>[0-9a-f]{12})-(?P<pid>\d+)-(?P<host>[\w.-]+)")
+
+
+@contextlib.contextmanager
+def scratch(out: Path) -> Iterator[Path]:
+    """An empty folder beside `out`, held by this process and removed when the block ends.
+
+    Those that dead processes of this host left in the same parent are removed first; a result that one of them had
+    moved aside, and not yet replaced, is moved back.
+
+    **Raises** `InputError` where another process holds `out`, and `OSError` where the parent cannot be written.
+    """
+    parent, key = out.absolute().parent, hashlib.sha256(out.name.encode(errors="surrogateescape")).hexdigest()[:12]
+    folder = parent / f".jaxsub-{key}-{os.getpid()}-{_host()}"
+    with _locked(parent):
+        for other in scratch_folders(parent):
+            if not is_dead(other):
+                _require_other_key(other, key, out)
+            else:
+                _clear(other)
+        folder.mkdir()
+        try:
+            lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT)
+        except OSError:
+            folder.rmdir()
+            raise
+        _lock(lock)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(lock)
+
+
+def scratch_folders(parent: Path) -> list[Path]:
+    """The scratch folders in `parent`."""
+    found = [Path(entry.path) for entry in os.scandir(parent) if _NAME.fullmatch(entry.name)]
+    return [path for path in found if path.is_dir() and not path.is_symlink()]
+
+
+def is_dead(folder: Path) -> bool:
+    """Whether the process that made a scratch folder is known to have ended."""
+    told = _NAME.fullmatch(folder.name)
+    if told is None or told["host"] != _host():
+        return False
+    try:
+        lock = os.open(folder / _LOCK, os.O_RDWR)
+    except OSError:
+        return not _runs(int(told["pid"]))
+    try:
+        return _lock(lock) if fcntl else not _runs(int(told["pid"]))
+    finally:
+        os.close(lock)
+
+
+def _require_other_key(other: Path, key: str, out: Path) -> None:
+    told = _NAME.fullmatch(other.name)
+    if told is not None and told["key"] == key:
+        remedy = f"wait for it or choose another --out; if it has ended, remove {other}"
+        raise InputError(str(out), f"process {told['pid']} on {told['host']} is writing there", remedy)
+
+
+def _clear(folder: Path) -> None:
+    for path in (folder / REPLACED).glob("*"):
+        back = folder.parent / path.name
+        if not os.path.lexists(back):
+            path.rename(back)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _locked(parent: Path) -> Iterator[None]:
+    """`parent` for this process alone, so that two that begin at once see each other."""
+    if fcntl is None:
+        yield
+        return
+    descriptor = os.open(parent, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # network folders that know no locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    """Whether the file could be locked."""
+    try:
+        if fcntl is not None:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _runs(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _host() -> str:
+    return re.sub(r"[^\w.-]", "_", socket.gethostname())[:60] or "localhost"
