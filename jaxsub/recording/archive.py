@@ -1,5 +1,6 @@
 """Recordings in a zip archive: `runs.zip` that holds one file, or `runs.zip!dive.csv` for one of several."""
 
+import os
 import shutil
 import tempfile
 import zipfile
@@ -19,7 +20,7 @@ _REMEDY = "give the path of an archive"
 def split_member(path: Path) -> tuple[Path, str]:
     """The archive and the member that `runs.zip!dive.csv` stands for; the member is empty for any other path."""
     archive, mark, member = str(path).partition(_SUFFIX + MARK)
-    return (Path(archive + _SUFFIX), member) if mark and not path.exists() else (path, "")
+    return (Path(archive + _SUFFIX), member) if mark and not os.path.exists(path) else (path, "")
 
 
 @contextmanager

@@ -61,7 +61,7 @@ def channels(path: str | os.PathLike[str]) -> list[Channel]:
     A column that holds no numbers has no samples. Raises InputError for a file that cannot be read.
     """
     path = Path(path)
-    if path.suffix.lower() in SUFFIXES or path.is_dir():
+    if path.suffix.lower() in SUFFIXES or _is_bag(path):
         return log_channels(path)
     listed = []
     for header, values in read(path)[0].table:
@@ -110,7 +110,7 @@ def _of_suffix(known: Mapping[str, T], path: Path, source: str) -> T:
 def _is_bag(path: Path) -> bool:
     try:
         return (path / "metadata.yaml").is_file()
-    except ValueError:  # a name with a NUL, in old Pythons
+    except (OSError, ValueError):  # a name that is too long or has a NUL
         return False
 
 
