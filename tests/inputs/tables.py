@@ -16,7 +16,7 @@ def text_case(
     *refused: str,
     suffix: str = ".csv",
     encoding: str = "utf-8",
-    **expected: Sequence[float],
+    **expected: Any,
 ) -> Case:
     """A file of `text`, refused with those words, or read as the columns `expected`; `said` is in a note."""
     content = text if isinstance(text, bytes) else text.encode(encoding)

@@ -9,6 +9,7 @@ from ...findings import Finding
 from .log import Series
 
 _FAR = 6.0 * 3600.0  # s from all other samples: a stamp that is a day off, or stands in 1970
+_BOOT, _SINCE_1970 = 1e8, 5e8  # s: three years since a computer began, and the year 1985
 _FEW = 0.1  # no more than this part of a channel is dropped
 _REMEDY = "see whether clocks differ"
 
@@ -41,6 +42,11 @@ def require_common_clock(series: Mapping[str, Series], source: str) -> None:
 
     Times since boot and since 1970 do. A command that was sent once before all else began does not.
     """
+    for name, one in series.items():
+        start, end = float(one.times.min()), float(one.times.max())
+        if start < _BOOT and end > _SINCE_1970:
+            what = f"is dated from {start:.10g} to {end:.10g} s, partly since boot and partly since 1970"
+            raise InputError(f"{source}, column {name!r}", what, _REMEDY)
     spans = sorted((float(one.times.min()), float(one.times.max()), name) for name, one in series.items())
     for index in range(1, len(spans)):
         before, after = spans[:index], spans[index:]

@@ -1,5 +1,6 @@
 """Slocum gliders' binary files (.dbd, .ebd, .sbd, .tbd, .mbd, .nbd and compressed .?cd), read by dbdreader."""
 
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import optional
+from ...errors import InputError, optional
 from .log import Channel, Log, Series
 
 # what a glider calls numbers without a unit; dbdreader turns positions into degrees
@@ -19,6 +20,8 @@ _SPELT = {
     "cc": "cm^3", "in": "inch", "volts": "V", "amps": "A", "watts": "W", "amp-hrs": "A hour", "lat": "deg",
     "lon": "deg",
 }  # fmt: skip
+_HEADER = 4096  # bytes in which it stands
+_TAGS, _SENSORS = 100, 50_000  # a glider has 14 and 1400
 _CLOCKS = ("m_present_time", "sci_m_present_time")
 
 
@@ -49,8 +52,18 @@ class SlocumLog(Log):
             samples = file.get(*known) if len(known) > 1 else [file.get(*known)]
             return {n: Series(*_in_order(*pair), _unit(file, n)) for n, pair in zip(known, samples, strict=True)}
 
+    def _check(self) -> None:
+        """Raise InputError for a header that claims more lines than a file has, which the reader would wait for."""
+        with self._path.open("rb") as file:
+            head = file.read(_HEADER)
+        for key, count in re.findall(rb"^(num_ascii_tags|total_num_sensors|sensors_per_cycle):\s*(\d+)", head, re.M):
+            if len(count) > 5 or int(count) > (_TAGS if key == b"num_ascii_tags" else _SENSORS):
+                what = f"claims {count[:20].decode()} for {key.decode()}"
+                raise InputError(str(self._path), what, "check that it is whole")
+
     @contextmanager
     def _file(self) -> Iterator[Any]:
+        self._check()
         beside = [self._path.parent / name for name in ("cac", "cache")]
         folder = next((folder for folder in beside if folder.is_dir()), None)
         if folder is None and any(self._path.parent.glob("*.[cC][aA][cC]")):
