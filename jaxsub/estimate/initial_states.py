@@ -26,7 +26,7 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
     layout, measured = vehicle.layout, state_channels(vehicle.layout)
     kept = memory_states(vehicle.effects)
     mask, outputs, times = np.asarray(runs.mask), np.asarray(runs.outputs), np.asarray(runs.times)
-    guess = np.array(rest(vehicle, len(times)))
+    guess = np.tile(_resting(vehicle), (len(times), 1))
     spread = np.ones(len(layout.states))
     for i, name in enumerate(layout.states):
         spread[i] = _MEMORY if name in kept else _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
@@ -46,11 +46,14 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
 
 def rest(vehicle: AbstractVehicle, count: int) -> Float[Array, "r s"]:
     """`count` initial states at the origin and at rest; a body that surges does so at its operating speed."""
+    return jnp.asarray(np.tile(_resting(vehicle), (count, 1)))
+
+
+def _resting(vehicle: AbstractVehicle) -> Float[np.ndarray, " s"]:
     layout = vehicle.layout
     surges = layout.kind == "submerged-body" and "u" in layout.states
     speed = float(vehicle.own_values()["speed"]) if surges else 0.0
-    state = [speed if surges and name == "u" else 0.0 for name in layout.states]
-    return jnp.broadcast_to(jnp.asarray(state), (count, len(state)))
+    return np.array([speed if surges and name == "u" else 0.0 for name in layout.states])
 
 
 def state_channels(layout: Layout) -> dict[str, str]:

@@ -11,6 +11,9 @@ nominal 95 % intervals then cover about 70 %. Here Γ is that of disturbance for
 Initial states are eliminated; priors count as observations of their own precision.
 """
 
+import dataclasses
+from typing import NamedTuple
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -25,6 +28,9 @@ from ..likelihood import (
     carried,
     first_guess,
 )
+
+# samples that the disturbance of long runs is estimated from: its few numbers gain nothing from more
+_WINDOWS, _LENGTH = 8, 2500
 
 
 class Coloured(eqx.Module):
@@ -51,14 +57,31 @@ def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None) -> Col
 
     The `disturbance` is estimated from the residuals where none is given. Coefficients at a bound are held there.
     """
-    covariance, disturbance = _corrected(fit.problem, fit.model, fit.pressed != 0.0, disturbance)
-    return Coloured(covariance, disturbance, fit.names)
+    reduced = _reduced(fit.problem, fit.model, fit.pressed != 0.0)
+    if disturbance is None:
+        disturbance = _estimated(reduced)
+    return Coloured(_sandwich(reduced, disturbance), disturbance, fit.names)
+
+
+class _Reduced(NamedTuple):
+    """A fit's whitened columns by directions of unit information.
+
+    `left` (R, K, c, p) is what initial states cannot follow, `pinned` (p, p) what priors tell, `basis` and `untold`
+    (p, p) the directions that anything tells and the others, `columns` the residual and its columns along the `basis`,
+    `prior` the products of their priors.
+    """
+
+    system: System
+    columns: Columns
+    prior: Array
+    left: Array
+    pinned: Array
+    basis: Array
+    untold: Array
 
 
 @eqx.filter_jit
-def _corrected(
-    problem: Problem, model: Linearised, held: Bool[Array, " p"], disturbance: Disturbance | None
-) -> tuple[Float[Array, "p p"], Disturbance]:
+def _reduced(problem: Problem, model: Linearised, held: Bool[Array, " p"]) -> _Reduced:
     theta, start, residual = whitened_columns(problem, model)
     # a coefficient at its bound is held there
     theta, precision = jnp.where(held, 0.0, theta), jnp.where(held, 1.0, problem.prior_std**-2.0)
@@ -79,11 +102,46 @@ def _corrected(
     prior = prior.at[1:, 1:].add(jnp.diag(jnp.where(empty, 1.0, 0.0)))
     system = System.of(model, problem.runs, problem.sigma, problem.spread)
     columns = Columns(jnp.concatenate([residual[..., None], theta @ basis], axis=-1))
-    if disturbance is None:
-        disturbance = estimate_disturbance(system, columns, prior, first_guess(system, residual))
-    # D = basis basisᵀ, so that white noise alone gives D back
-    middle = basis.T @ (carried(disturbance, system, left) + pinned) @ basis
-    return basis @ middle @ basis.T + untold @ untold.T, disturbance
+    return _Reduced(system, columns, prior, left, pinned, basis, untold)
+
+
+def _estimated(reduced: _Reduced) -> Disturbance:
+    """The disturbance of the residuals; of long runs, of windows spread over them."""
+    system, columns = _windows(reduced.system, reduced.columns)
+    return estimate_disturbance(system, columns, reduced.prior, first_guess(system, columns.shown[..., 0]))
+
+
+def _windows(system: System, columns: Columns) -> tuple[System, Columns]:
+    """All of it where that is no more than `_WINDOWS` windows of `_LENGTH` samples, else so many spread evenly."""
+    count, samples = system.measured.shape[:2]
+    if count * samples <= _WINDOWS * _LENGTH:
+        return system, columns
+    length = min(samples, _LENGTH)
+    chosen = np.linspace(0, count - 1, min(count, _WINDOWS)).round().astype(int)
+    begins = np.linspace(0, samples - length, max(1, _WINDOWS // len(chosen))).round().astype(int)
+
+    def cut(array: Array, length: int = length) -> Array:
+        """The windows, by NumPy, for which no program has to be made."""
+        return jnp.asarray(np.stack([np.asarray(array[r])[a : a + length] for r in chosen for a in begins]))
+
+    steps = lambda array: cut(array, length - 1)
+    found = dataclasses.replace(
+        system,
+        A=steps(system.A),
+        G=steps(system.G),
+        C=cut(system.C),
+        measured=cut(system.measured),
+        intervals=steps(system.intervals),
+    )
+    return found, Columns(cut(columns.shown))
+
+
+@eqx.filter_jit
+def _sandwich(reduced: _Reduced, disturbance: Disturbance) -> Float[Array, "p p"]:
+    """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
+    basis, untold = reduced.basis, reduced.untold
+    middle = basis.T @ (carried(disturbance, reduced.system, reduced.left) + reduced.pinned) @ basis
+    return basis @ middle @ basis.T + untold @ untold.T
 
 
 def whitened_columns(problem: Problem, model: Linearised) -> tuple[Array, Array, Array]:

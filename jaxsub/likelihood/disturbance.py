@@ -181,12 +181,34 @@ def augmented(
 def carried(disturbance: Disturbance, system: System, weights: Float[Array, "r k c p"]) -> Float[Array, "p p"]:
     r"""$\sum_r W_r^T\Gamma_r W_r$ with $\Gamma$ the residuals' covariance under `disturbance`, initial states known.
 
-    By the adjoint recursion, one pass backwards through each run, instead of a sum over all pairs of samples.
+    By the adjoint recursion, one pass backwards through each run that keeps no sample: with $\lambda_k$ the weights'
+    lever on the state, $a_k$ theirs on the force and $f_k = a_k + \rho_k f_{k+1}$, forces of unit variance contribute
+    $\sum_k a_kf_k^T + f_ka_k^T - a_ka_k^T$.
     """
-    asked = _asked(system, weights)
-    forces = disturbance.force[:, None] ** 2 * _correlated(disturbance.time, system.intervals, asked)
+    n = len(disturbance.force)
+    rho = jnp.exp(-system.intervals[..., None] / disturbance.time)
+    before = lambda M: jnp.concatenate([jnp.zeros_like(M[:, :1]), M], axis=1)
+
+    def step(carry: tuple[Array, Array, Array], at: tuple[Array, ...]) -> tuple[tuple[Array, Array, Array], None]:
+        lever, following, total = carry
+        A, begin, end, C, rho, weight = at
+        asked = begin.T @ lever
+        lever = C.T @ weight + A.T @ lever
+        asked = asked + end.T @ lever
+        following = asked + rho[:, None] * following
+        scaled = disturbance.force[:, None] ** 2 * asked
+        total = total + scaled.T @ following + following.T @ scaled - scaled.T @ asked
+        return (lever, following, total), None
+
+    def run(*samples: Array) -> Array:
+        p, s = weights.shape[-1], system.A.shape[-1]
+        nothing = jnp.zeros((s, p)), jnp.zeros((n, p)), jnp.zeros((p, p))
+        return jax.lax.scan(step, nothing, samples, reverse=True)[0][2]
+
+    begin, end = beyond(system.G[..., :n]), before(system.G[..., n:])
+    forces = jax.vmap(run)(beyond(system.A), begin, end, system.C, beyond(rho), weights)
     white = jnp.where(system.measured, disturbance.noise, 1.0)[..., None] * weights
-    return jnp.einsum("rknp,rknq->pq", asked, forces) + jnp.einsum("rkcp,rkcq->pq", white, white)
+    return jnp.sum(forces, axis=0) + jnp.einsum("rkcp,rkcq->pq", white, white)
 
 
 def covariance_derivatives(
