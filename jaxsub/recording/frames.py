@@ -26,7 +26,7 @@ def from_pandas(frame: pandas.DataFrame, name: str = "run") -> Recording:
     The time is the column `t`; else the index, if that is named `t` or holds times or spans. Instants count in s from
     the first. Raises InputError for whatever a file would be refused for, naming `name`.
     """
-    table = [(str(header), _of_series(column)) for header, column in frame.items()]
+    table: Table = [(str(header), _of_series(column)) for header, column in frame.items()]
     if not any(_is_time(header) for header, _ in table):
         index = frame.index
         if _is_time(str(index.name)):

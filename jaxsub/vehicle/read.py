@@ -119,10 +119,11 @@ def _read_effects(
         for symbol, item in given.items():
             field = symbols[symbol]
             values[field], table_rows[field] = read_number(item, f"{place}.parameters.{symbol}", table_rows[field])
+        effect = kind(**options(effect), **values)
         if table.data.get("expression", effect.expression) != effect.expression:
             remedy = "delete the line; it says for a reader what the effect computes"
             raise InputError(f"{place}.expression", f"is not {effect.expression!r}", remedy)
-        effects.append(kind(**options(effect), **values))
+        effects.append(effect)
         rows += list(table_rows.values())
     return tuple(effects), tuple(rows)
 
