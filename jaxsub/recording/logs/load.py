@@ -70,6 +70,7 @@ def load_log(
         if name in columns or name == TIME:
             raise InputError(where, "is there already", "give each column one line; a log brings its own times")
         source = turned[term.channel][term.function] if term.function in _AXES else found[term.channel]
+        where = where if unit is not None else f"{path}, column {header!r}"
         columns[name] = _column(where, name, source, term, unit)
         if unit is None and source.unit and columns[name].unit == "":
             what = f"{chosen.columns[header]!r} is taken in {source.unit}, the unit that the log states"
