@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxsub.errors import InputError, nearest
 from jaxsub.findings import Finding
-from jaxsub.units import TIME, UnknownUnit, check_time_unit, from_si
+from jaxsub.units import TIME, UnknownUnit, check_time_unit, column_unit, from_si, si_unit
 
 FIRST_ROW = 2  # in a file the header is row 1
 
@@ -97,7 +97,8 @@ class Recording:
     def in_units(self, units: Mapping[str, str]) -> dict[str, np.ndarray]:
         """Return times and columns as a file holds them, headed `name[unit]` where `units` gives one, else `name`.
 
-        Raises InputError for an absent column, an unknown unit or a unit of `t` that is not one of time.
+        Raises InputError for an absent column, an unknown unit, and a unit of another dimension than the file's, or of
+        `t` than time.
         """
         samples = {TIME: self.times, **self.columns}
         headed = {name: f"{name}[{units[name]}]" if name in units else name for name in samples}
@@ -106,7 +107,13 @@ class Recording:
             try:
                 if name == TIME:
                     check_time_unit(where, unit)
-                samples[name] = from_si(self.times if name == TIME else self.column(name), unit)
+                    samples[name] = from_si(self.times, unit)
+                    continue
+                meant = column_unit(name, unit)
+                si = si_unit(meant) or "1"
+                if (stated := self.units.get(name, si)) != si:
+                    raise InputError(where, f"is in {stated}, which {unit!r} is no unit of", f"write it in {stated}")
+                samples[name] = from_si(self.column(name), meant)
             except UnknownUnit as error:
                 raise InputError(where, str(error), error.remedy) from error
         return {headed[name]: values for name, values in samples.items()}

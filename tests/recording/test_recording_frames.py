@@ -91,3 +91,8 @@ def test_g_is_gravity_on_an_acceleration_and_gram_elsewhere():
     np.testing.assert_allclose(made.column("ax"), 0.00980665)
     np.testing.assert_allclose(made.column("lead"), 1e-3)
     assert made.units == {"az": "m/s²", "ax": "m/s²", "lead": "kg"}
+    written = to_pandas(made, {"az": "g", "lead": "g"})
+    np.testing.assert_allclose(written["az[g]"], [1.0, -1.0])
+    np.testing.assert_allclose(written["lead[g]"], 1.0)
+    with pytest.raises(InputError, match=r"column 'az': is in m/s², which 'deg' is no unit of; write it in m/s²"):
+        to_pandas(made, {"az": "deg"})
