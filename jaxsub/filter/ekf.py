@@ -5,6 +5,7 @@ On-line, `on_line` compiles `step` for one sample at a time; off-line, `passes.o
 
 import abc
 import dataclasses
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -28,7 +29,8 @@ class FilterState(eqx.Module):
     - `x`: (n,) state, of s ways to change. `theta`: (p,) parameters.
     - `joint`: what the filter's form keeps of the uncertainty of [x, θ]; `own`: of x were θ known, where it has that.
     - `memory`, `residuals`: of the process-noise rule.
-    - `outside`: (c,) how often each channel was outside the gate in a row.
+    - `outside`: (c,) how often each channel was outside the gate in a row, in agreement; `refused`: (c,) the innovation
+      of the last that was.
     - `diverged`: whether a number ceased to be finite. The filter then stays at its last finite numbers.
     """
 
@@ -39,6 +41,7 @@ class FilterState(eqx.Module):
     memory: Any
     residuals: Residuals
     outside: Int[Array, " c"]
+    refused: Float[Array, " c"]
     diverged: Bool[Array, ""]
 
 
@@ -113,14 +116,18 @@ class AbstractFilter(eqx.Module):
         self, x: Float[Array, " n"], theta: Float[Array, " p"], joint: Float[Array, "q q"], diverged: Bool[Array, ""]
     ) -> FilterState:
         residuals = Residuals.none(self.x_root, self.R_root)
-        outside = jnp.zeros(len(self.R_root), int)
-        return _strong(FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, outside, diverged))
+        outside, refused = jnp.zeros(len(self.R_root), int), jnp.zeros(len(self.R_root), x.dtype)
+        begun = FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, outside, refused, diverged)
+        return _strong(begun)
 
     def step(self, state: FilterState, sample: Sample) -> tuple[FilterState, Estimate]:
         """The next state and what is known after `sample`."""
         memory, root = self.noise(state.memory, state.residuals, sample.elapsed)
         moves = sample.elapsed > 0.0
-        G = jnp.where(moves, self.process.driven(state.x, state.theta, sample, root), 0.0)
+        driven = self.process.driven(state.x, state.theta, sample, root)
+        if not isinstance(self.gate, Open):
+            driven = jnp.concatenate([driven, jnp.where(self._begins_anew(state, sample), self.x_root, 0.0)], axis=1)
+        G = jnp.where(moves, driven, 0.0)
         moved = dataclasses.replace(self.predict(state, sample, G), memory=memory)
         before = select(moves, moved, state)
         before, seen = self._look(before, sample)
@@ -140,6 +147,10 @@ class AbstractFilter(eqx.Module):
         parts = (after.x, after.theta, deviations[:s], deviations[s:], innovation, factor, seen.mask & sound)
         return after, Estimate(*parts, noise_std, after.diverged)
 
+    def _begins_anew(self, state: FilterState, sample: Sample) -> Bool[Array, ""]:
+        """Whether a channel has just used up the gate's patience: the state is then as uncertain as at the start."""
+        return jnp.any(sample.mask & (state.outside > 0) & (state.outside == self.gate.patience))
+
     def _look(self, state: FilterState, sample: Sample) -> tuple[FilterState, Innovation]:
         """What `sample` shows, what the gate refuses left out, and what the gate has seen so far."""
         process = self.process
@@ -150,10 +161,15 @@ class AbstractFilter(eqx.Module):
         R_root = self.R_root if sample.scale is None else sample.scale[:, None] * self.R_root
         innovation = process.innovation(sample.outputs, expected)
         covariance = self.form.seen(state.joint, C) + R_root @ R_root.T
-        inside = self.gate.inside(innovation, jnp.sqrt(jnp.diag(covariance)))
-        mask = sample.mask & (inside | (state.outside >= self.gate.patience))
-        outside = jnp.where(sample.mask, jnp.where(inside, 0, state.outside + 1), state.outside)
-        after = dataclasses.replace(state, outside=outside)
+        deviations = jnp.sqrt(jnp.diag(covariance))
+        inside, patient = self.gate.inside(innovation, deviations), state.outside < self.gate.patience
+        mask = sample.mask & (inside | ~patient)
+        # of two measurements that err independently the difference has twice the variance
+        agrees = self.gate.inside(process.innovation(innovation, state.refused), math.sqrt(2.0) * deviations)
+        longer = jnp.where(agrees | ~patient, state.outside + 1, 1)
+        outside = jnp.where(sample.mask, jnp.where(inside, 0, longer), state.outside)
+        refused = jnp.where(sample.mask & ~inside, innovation, state.refused)
+        after = dataclasses.replace(state, outside=outside, refused=refused)
         return after, Innovation(jnp.where(mask, innovation, 0.0), mask, C, R_root, covariance)
 
 

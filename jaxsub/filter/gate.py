@@ -1,21 +1,26 @@
 """Innovation gates: which measurements a filter believes."""
 
 import abc
+import math
+from statistics import NormalDist
 
 import equinox as eqx
 import jax.numpy as jnp
+from jax.typing import DTypeLike
 from jaxtyping import Array, Bool, Float
 
 
 class AbstractGate(eqx.Module):
     """Decides channel by channel, from how far a measurement lies from what was expected.
 
-    A filter that is wrong itself would refuse the truth for ever: a channel that was outside too often in a row is
-    believed, until it is inside again.
+    A filter that is wrong itself would refuse the truth for ever. A channel whose measurements were outside too often
+    in a row, and agreed with each other, is believed until it is inside again; with the first of them the state becomes
+    as uncertain as at the start. Wild measurements do not agree, and are refused however many they are.
 
     **Fields**
 
-    - `patience`: how many measurements in a row a channel may be outside before it is believed.
+    - `patience`: how many measurements in a row a channel may be outside, each inside the gate about the one before,
+      until it is believed.
     """
 
     patience: eqx.AbstractVar[int]
@@ -36,7 +41,9 @@ class Open(AbstractGate):
 
 
 class InnovationGate(AbstractGate):
-    """Refuses what lies further than so many standard deviations from what was expected.
+    r"""Refuses what lies further than so many standard deviations from what was expected.
+
+    That is the test of $\nu_i^2/S_{ii}$ against the chi-square distribution of one degree of freedom.
 
     **Fields**
 
@@ -45,6 +52,17 @@ class InnovationGate(AbstractGate):
 
     widths: Float[Array, " c"]
     patience: int = eqx.field(static=True)
+
+    @classmethod
+    def of(
+        cls, channels: int, false_rejection: float = 1e-6, patience: int = 5, dtype: DTypeLike | None = None
+    ) -> "InnovationGate":
+        """The gate that refuses a measurement of a consistent filter with probability `false_rejection`.
+
+        By default 4.9 standard deviations: at ten measurements a second, one in a day of each channel.
+        """
+        width = NormalDist().inv_cdf(1.0 - 0.5 * false_rejection) if false_rejection > 0.0 else math.inf
+        return cls(widths=jnp.full(channels, width, dtype), patience=patience)
 
     def inside(self, innovation: Float[Array, " c"], deviations: Float[Array, " c"]) -> Bool[Array, " c"]:
         """Those within so many deviations."""

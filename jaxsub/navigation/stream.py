@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
-from ..filter import AbstractFilter, Estimate, FilterState, Sample, select
+from ..filter import AbstractFilter, AbstractGate, Estimate, FilterState, InnovationGate, Open, Sample, select
 
 
 class Reading(eqx.Module):
@@ -47,6 +47,8 @@ class Faults(eqx.Module):
     - `saturated`: with an input at its range.
     - `outputs`: (c,) measured, but the number or its scale was not finite, or the scale not positive; left out.
     - `repeated`: (c,) measured already at that time; left out.
+    - `rejected`: (c,) outside the gate; left out. `recoveries`: (c,) measured when the gate's patience was used up: the
+      channel was believed again, by a state as uncertain as at the start. The state was wrong before that, or is now.
     - `broken`: that would have left numbers in the filter that are not finite, passed over.
     """
 
@@ -59,13 +61,15 @@ class Faults(eqx.Module):
     saturated: Int[Array, " *k"]
     outputs: Int[Array, "*k c"]
     repeated: Int[Array, "*k c"]
+    rejected: Int[Array, "*k c"]
+    recoveries: Int[Array, "*k c"]
     broken: Int[Array, " *k"]
 
     @classmethod
     def none(cls, channels: int) -> "Faults":
         """Nothing was wrong yet."""
         zero, each = jnp.zeros((), jnp.int32), jnp.zeros(channels, jnp.int32)
-        return cls(zero, zero, zero, zero, zero, zero, zero, each, each, zero)
+        return cls(zero, zero, zero, zero, zero, zero, zero, each, each, each, each, zero)
 
     def plus(self, **found: Bool[Array, "..."]) -> "Faults":
         """With those that were `found`."""
@@ -146,12 +150,23 @@ class Stream(AbstractStream):
       counted only; to mistrust such a sensor is up to the process.
     - `longest`: s, above it the time between two readings is a gap, across which the later one's inputs hold.
     - `patience`: readings in a row that may be earlier than one before, until the clock is taken to have been set back.
+    - `gate`: which measurements are believed; by default the filter's gate, or where that believes everything
+      `InnovationGate.of` its channels, which refuses one in a million that are consistent. `Open()` believes all.
     """
 
     filter: AbstractFilter
     ranges: PyTree | None = None
     longest: float = eqx.field(static=True, default=1.0)
     patience: int = eqx.field(static=True, default=10)
+    gate: AbstractGate | None = None
+
+    def _gated(self) -> AbstractFilter:
+        """The filter with the stream's gate."""
+        if self.gate is None and not isinstance(self.filter.gate, Open):
+            return self.filter
+        R_root = self.filter.R_root
+        gate = self.gate or InnovationGate.of(len(R_root), dtype=R_root.dtype)
+        return eqx.tree_at(lambda filter: filter.gate, self.filter, gate)
 
     def start(self, state: FilterState, like: Reading) -> StreamState:
         """Before the first reading; readings will have the shapes of `like`, which may be the first itself.
@@ -172,7 +187,8 @@ class Stream(AbstractStream):
         outputs = jnp.where(mask, reading.outputs, 0.0)
         scale = None if reading.scale is None else jnp.where(mask, reading.scale, 1.0)
         elapsed = tick.elapsed.astype(state.filter.x.dtype)
-        moved, estimate = self.filter.step(state.filter, Sample(inputs, elapsed, outputs, mask, scale))
+        filter = self._gated()
+        moved, estimate = filter.step(state.filter, Sample(inputs, elapsed, outputs, mask, scale))
         broken = moved.diverged & ~tick.passed
         passed = tick.passed | broken
         # a filter asked about nothing would forget what its last measurement did before its rule has seen it
@@ -189,6 +205,8 @@ class Stream(AbstractStream):
             saturated=self._saturated(reading.inputs) & ~passed,
             outputs=reading.mask & ~sound & ~passed,
             repeated=repeated & ~passed,
+            rejected=mask & ~estimate.used & ~broken,
+            recoveries=mask & ~broken & (state.filter.outside > 0) & (state.filter.outside == filter.gate.patience),
             broken=broken,
         )
         after = StreamState(

@@ -33,12 +33,12 @@ def follow(filter, samples):
     return jax.lax.scan(one, state, samples)[1]
 
 
-def record(count=100, seed=0):
-    """What the filter is told is true of it."""
+def record(count=100, seed=0, jump=0.0):
+    """What the filter is told is true of it, but for a `jump` of the state at sample 30."""
     rng = np.random.default_rng(seed)
     x, inputs, outputs = 0.5 * rng.normal(size=2), rng.normal(size=(count, 2)), []
-    for u in inputs:
-        x = F @ x + u + Q_ROOT @ rng.normal(size=2)
+    for k, u in enumerate(inputs):
+        x = F @ x + u + Q_ROOT @ rng.normal(size=2) + jump * (k == 30)
         outputs.append(C @ x + R_ROOT @ rng.normal(size=2))
     return inputs, np.array(outputs)
 
@@ -77,15 +77,36 @@ def test_refusals_of_what_is_consistent_are_as_many_as_expected():
 
 
 def test_patience_lets_a_filter_that_was_wrong_return():
-    inputs, outputs = record()
-    outputs[30:] += 5.0
+    inputs, outputs = record(jump=5.0)
     kept, _ = follow(gated(InnovationGate(jnp.full(2, 5.0), 1000)), sequence(inputs, outputs))
-    assert not kept.used[30:].any()
+    assert (~kept.used[30:50]).sum() > 20
     seen, states = follow(gated(InnovationGate(jnp.full(2, 5.0), 4)), sequence(inputs, outputs))
-    np.testing.assert_array_equal(seen.used[30:35], [[False] * 2] * 4 + [[True] * 2])
+    # the other channel turns back inside by itself
+    np.testing.assert_array_equal(seen.used[30:35, 0], [False] * 4 + [True])
     np.testing.assert_array_equal(states.outside[30:34, 0], [1, 2, 3, 4])
+    # at once, since the state begins anew, and from then on as the filter that believes everything
     free, _ = follow(gated(Open()), sequence(inputs, outputs))
-    assert np.linalg.norm(seen.x[-1] - free.x[-1]) < 0.05 * np.linalg.norm(kept.x[-1] - free.x[-1])
+    assert seen.used[34:].all()
+    assert np.abs(seen.x[34] - outputs[34])[0] < 1.0
+    np.testing.assert_allclose(seen.x[60:], free.x[60:], atol=0.01)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_wild_measurements_that_disagree_are_refused_however_many_they_are(seed):
+    """Sixty in a row, of all sizes; the filter is that of a record which lacks them."""
+    rng = np.random.default_rng(seed)
+    inputs, outputs = record()
+    outputs[30:90, 1] = rng.choice([-1.0, 1.0], 60) * 10.0 ** rng.uniform(1.5, 12.0, 60)
+    lacking = np.ones((100, 2), bool)
+    lacking[30:90, 1] = False
+    seen, _ = follow(gated(InnovationGate.of(2)), sequence(inputs, outputs))
+    expected, _ = follow(gated(InnovationGate.of(2)), sequence(inputs, outputs, lacking))
+    np.testing.assert_allclose(seen.x, expected.x, atol=1e-12)
+
+
+def test_default_width_refuses_one_in_a_million():
+    np.testing.assert_allclose(2.0 * norm.sf(InnovationGate.of(3).widths), 1e-6, rtol=1e-6)
+    assert np.isinf(InnovationGate.of(1, 0.0).widths).all()
 
 
 def test_missing_measurements_neither_try_nor_restore_patience():
