@@ -2,6 +2,7 @@
 
 import functools
 import re
+import threading
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from jaxsub.unit_names import AMBIGUOUS, PHRASES, unit_name
 TIME = "t"  # the column that holds the time
 ACCELERATIONS = ("ax", "ay", "az")  # the columns that hold specific forces
 
+_BUILDING = threading.Lock()
 _COMMON = (
     "m", "cm", "mm", "km", "ft", "s", "ms", "min", "hour", "rad", "deg", "degree", "m/s", "knot", "rad/s", "deg/s",
     "rpm", "Hz", "m/s^2", "g", "kg", "tonne", "N", "kN", "lbf", "N m", "Pa", "kPa", "bar", "dbar", "psi", "m^3", "cm^3",
@@ -141,8 +143,14 @@ def _convert(values: np.ndarray, source: Any, target: Any) -> np.ndarray:
         return _registry().Quantity(values, source).to(target).magnitude
 
 
-@functools.cache
 def _registry() -> Any:
+    # threads that build one each would hold units that do not convert into each other
+    with _BUILDING:
+        return _built_registry()
+
+
+@functools.cache
+def _built_registry() -> Any:
     # Built on first use, because it takes a noticeable time, and our own, so that no other library's units leak in.
     import pint
 
