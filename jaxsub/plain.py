@@ -29,3 +29,10 @@ def plain(content: Any) -> Any:
         return plain({field.name: getattr(content, field.name) for field in dataclasses.fields(content)})
     # arrays and scalars of NumPy and JAX
     return plain(content.tolist())
+
+
+def finite_text(value: float, form: str = ".3g") -> str:
+    """`value` in a sentence, formatted by `form`; a number that is not finite in words."""
+    if math.isnan(value):
+        return "undefined"
+    return format(value, form) if math.isfinite(value) else "beyond all bounds"

@@ -5,7 +5,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from jaxsub.cli.diagnose import show, write_diagnosis
+from jaxsub.cli.diagnose import diagnosed
 from jaxsub.discrepancy import Diagnosis
 from jaxsub.discrepancy.diagnosis import Estimate
 from jaxsub.vehicle import read_vehicle
@@ -24,9 +24,11 @@ def diagnose_case(case: Case, folder: Path) -> tuple[Diagnosis, dict]:
     (folder / "vehicle.toml").write_text(case.vehicle, encoding="utf-8")
     shutil.rmtree(folder / "figures", ignore_errors=True)
     begin = time.perf_counter()
-    diagnosis = write_diagnosis(read_vehicle(folder / "vehicle.toml"), case.train, case.held, folder)
+    answer = diagnosed(read_vehicle(folder / "vehicle.toml"), case.train, case.held)
+    diagnosis = answer.diagnosis
+    answer.emit()
+    answer.write(folder)
     seconds = time.perf_counter() - begin
-    show(diagnosis, folder)
     draw_held_out(diagnosis, case, folder / "held_out.png")
     return diagnosis, {**numbers(diagnosis, case), "seconds": round(seconds, 1), "by_hand": by_hand(case, folder)}
 

@@ -16,7 +16,7 @@ from ..simulate.synthetic import sampled_states, synthetic
 from ..vehicle import AbstractVehicle, read_vehicle, write_vehicle
 from ..vehicle.catalogue import nps_auv_ii
 from . import session, terminal
-from .diagnose import show, write_diagnosis
+from .diagnose import diagnosed
 from .output import fresh_folder
 from .runs import load_runs
 
@@ -47,8 +47,10 @@ def run(out: Path, seed: int, overwrite: bool) -> None:
         concealed = make_files(folder, seed)
         vehicle = read_vehicle(folder / "vehicle.toml")
         runs = load_runs(sorted(folder.glob("run*.csv")), vehicle)
-        diagnosis = write_diagnosis(vehicle, runs[:-1], runs[-1:], folder)
-    show(diagnosis, out)
+        answer = diagnosed(vehicle, runs[:-1], runs[-1:])
+        answer.emit()
+        answer.write(folder)
+    terminal.note(f"report: {out / 'report.html'}")
     if concealed is not None:
         terminal.note(f"concealed was: {concealed.label}")
 

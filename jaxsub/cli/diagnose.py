@@ -14,6 +14,7 @@ from ..effects import AbstractEffect, from_script, vocabulary
 from ..plain import to_json
 from ..recording import Recording, hold_out, save
 from ..report import write_report
+from ..report.text import measurement, percent, ratio, unit
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
 from . import session, terminal
 from .output import fresh_folder, paths_of, require_replaceable
@@ -45,48 +46,73 @@ def run(
     recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
     train, judged = (recordings, unseen) if held else hold_out(recordings)
     with fresh_folder(out, overwrite, inputs) as folder:
-        diagnosis = write_diagnosis(vehicle, train, judged, folder, (*vocabulary(), *own), manoeuvre)
-    terminal.emit(diagnosis.to_json(), lambda: show(diagnosis, out))
+        answer = diagnosed(vehicle, train, judged, (*vocabulary(), *own), manoeuvre)
+        # shown before it is written: where writing fails, minutes of work are not lost
+        answer.emit()
+        answer.write(folder)
+    terminal.note(f"report: {out / 'report.html'}")
 
 
-def write_diagnosis(
+@dataclasses.dataclass(frozen=True)
+class Answer:
+    """A diagnosis, the improved vehicle, and the inputs of the run that would tell rivals apart, if there are any."""
+
+    diagnosis: Diagnosis
+    improved: AbstractVehicle
+    next_run: Recording | None
+
+    def emit(self) -> None:
+        """Print the verdict, or with `--json` what `diagnosis.json` holds, on standard output."""
+        terminal.emit(self.diagnosis.to_json(), lambda: show(self.diagnosis))
+
+    def write(self, folder: Path) -> None:
+        """Write `diagnosis.json`, `improved.toml`, `report.html`, `figures/` and `next_manoeuvre.csv` into `folder`."""
+        diagnosis = self.diagnosis
+        text = vehicle_text(self.improved, f"{diagnosis.vehicle}, improved by jaxsub\n{diagnosis.summary}")
+        (folder / "improved.toml").write_text(text, encoding="utf-8")
+        (folder / "diagnosis.json").write_text(to_json(diagnosis.to_json()), encoding="utf-8")
+        if self.next_run is not None:
+            save(self.next_run, folder / _NEXT)
+        write_report(diagnosis, text, folder)
+
+
+def diagnosed(
     vehicle: AbstractVehicle,
     train: Sequence[Recording],
     held: Sequence[Recording],
-    folder: Path,
     kinds: tuple[type[AbstractEffect], ...] | None = None,
     manoeuvre: bool = True,
-) -> Diagnosis:
-    """Diagnose, and write `diagnosis.json`, `improved.toml`, `report.html` and `figures/` into `folder`.
+) -> Answer:
+    """Diagnose `vehicle` by the runs `train`, judged on `held`, trying effects of `kinds`: all installed where None.
 
-    Where rivals remain and a `manoeuvre` is wanted, `next_manoeuvre.csv` holds inputs that would tell them apart.
+    Where rivals remain and a `manoeuvre` is wanted, inputs that would tell them apart are looked for.
     """
     with terminal.progress(f"diagnosing {vehicle.layout.name}") as told:
         diagnosis, improved = diagnose_runs(vehicle, train, held, vocabulary=kinds, progress=told)
-        if manoeuvre and diagnosis.explanations:
-            told("looking for the manoeuvre that would settle it")
-            diagnosis = _with_next_run(diagnosis, train, folder)
-        told("writing the report")
-        text = vehicle_text(improved, f"{vehicle.layout.name}, improved by jaxsub\n{diagnosis.summary}")
-        (folder / "improved.toml").write_text(text, encoding="utf-8")
-        (folder / "diagnosis.json").write_text(to_json(diagnosis.to_json()), encoding="utf-8")
-        write_report(diagnosis, text, folder)
-    return diagnosis
+        if not (manoeuvre and diagnosis.explanations):
+            return Answer(diagnosis, improved, None)
+        told("looking for the manoeuvre that would settle it")
+        found = next_run(diagnosis, train)
+        if found is None:
+            return Answer(diagnosis, improved, None)
+        advice = f"{diagnosis.next_manoeuvre}. {said(found, _NEXT)}"
+        return Answer(dataclasses.replace(diagnosis, next_manoeuvre=advice), improved, found.recording)
 
 
-def _with_next_run(diagnosis: Diagnosis, train: Sequence[Recording], folder: Path) -> Diagnosis:
-    """The diagnosis with what is said of the next manoeuvre, which is written beside it."""
-    found = next_run(diagnosis, train)
-    if found is None:
-        return diagnosis
-    save(found.recording, folder / _NEXT)
-    return dataclasses.replace(diagnosis, next_manoeuvre=f"{diagnosis.next_manoeuvre}. {said(found, _NEXT)}")
-
-
-def show(diagnosis: Diagnosis, out: Path) -> None:
-    """The verdict on the terminal."""
-    held = diagnosis.fit["held_out"]
-    channel = max(held["baseline"], key=lambda c: held["baseline"][c] / max(held["improved"][c], 1e-12))
-    gain = f"held-out rms/σ of {channel}: {held['baseline'][channel]:.2f} before, {held['improved'][channel]:.2f} after"
-    terminal.results.print(Panel(Text(f"{diagnosis.summary}\n{gain}"), title=diagnosis.verdict, expand=False))
-    terminal.say(f"report: {out / 'report.html'}")
+def show(diagnosis: Diagnosis) -> None:
+    """The verdict, the effects that were named, and the errors on the test runs, on standard output."""
+    terminal.results.print(Panel(Text(diagnosis.summary), title=diagnosis.verdict, expand=False))
+    parameters = [
+        (found.label, symbol, measurement(one.value, one.standard_error), unit(one.unit), percent(found.probability))
+        for found in diagnosis.physics
+        for symbol, one in found.parameters.items()
+    ]
+    if parameters:
+        terminal.table(("effect", "parameter", "value", "unit", "probability of the effect"), parameters)
+    before, after = (diagnosis.fit.get("held_out", {}).get(model, {}) for model in ("baseline", "improved"))
+    if diagnosis.improves:
+        rows = [(name, ratio(value), ratio(after.get(name))) for name, value in before.items()]
+        terminal.table(("test run: channel", "rms/σ of the baseline", "of the improved model"), rows)
+    elif before:
+        rows = [(name, ratio(value)) for name, value in before.items()]
+        terminal.table(("test run: channel", "rms/σ"), rows)

@@ -35,7 +35,12 @@ def load_train_and_test(
 
 def load_checked_run(path: Path, vehicle: AbstractVehicle, columns: Path | None = None) -> Recording:
     """The recording at `path`, checked, in one piece. Raises InputError where a hole in time cuts it."""
-    checked = check(vehicle, [load_run(path, vehicle, columns)])
+    return checked_run(load_run(path, vehicle, columns), vehicle)
+
+
+def checked_run(recording: Recording, vehicle: AbstractVehicle) -> Recording:
+    """The recording, checked, in one piece. Raises InputError where a hole in time cuts it."""
+    checked = check(vehicle, [recording])
     require_none(checked.findings)
     if len(checked.recordings) > 1:
         gap = next(finding for finding in checked.findings if finding.check == "time-gap" and finding.remedy)

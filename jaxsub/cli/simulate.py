@@ -1,5 +1,6 @@
 """`jaxsub simulate`: the model's answer to a recording's inputs, and how far it is from what was measured."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any, Literal
 
@@ -9,17 +10,17 @@ from jaxtyping import Array, Float
 
 from ..discrepancy import batch
 from ..errors import InputError
-from ..estimate import channel_rms, initial_guess, predict, rest, search, state_channels
+from ..estimate import Assessment, assess_residuals, channel_rms, initial_guess, predict, rest, search, state_channels
 from ..findings import Finding
 from ..likelihood import residual_outputs
 from ..recording import Recording, save
 from ..recording.runs import Runs
 from ..report.text import unit
 from ..results import RESULTS
-from ..vehicle import AbstractVehicle, read_vehicle
+from ..vehicle import AbstractVehicle, read_vehicle, vehicle_findings
 from . import session, terminal
 from .output import fresh_file, paths_of, require_replaceable
-from .runs import load_run
+from .runs import checked_run, load_run
 
 Start = Literal["rest", "recorded", "estimated"]
 
@@ -41,17 +42,17 @@ def run(
     inputs = paths_of(vehicle_path, run_path, columns)
     require_replaceable(out, overwrite, inputs)
     vehicle = read_vehicle(vehicle_path)
-    recording = load_run(run_path, vehicle, columns)
-    terminal.warn(recording.findings)
-    given = with_every_channel(recording, vehicle)
+    recording = checked_run(with_every_channel(load_run(run_path, vehicle, columns), vehicle), vehicle)
     with terminal.progress(f"simulating {vehicle.layout.name}"):
-        runs = batch(vehicle, [given])
+        runs = batch(vehicle, [recording])
         began, state, findings = initial_state(vehicle, runs, recording, start)
         shown = predict(vehicle, runs, state[None])
     if not np.all(np.isfinite(np.asarray(shown))):
         raise InputError(str(vehicle_path), "the model diverges on these inputs", "check the coefficients' signs")
+    known = vehicle_findings(vehicle, vehicle.layout.name)
+    fit, assessment = errors(vehicle, runs, shown)
+    findings += unexplained(assessment, recording.source)
     terminal.warn(findings)
-    fit = errors(vehicle, runs, shown)
     content = {
         "schema": 1,
         "vehicle": vehicle.layout.name,
@@ -60,7 +61,8 @@ def run(
         "start": began,
         "initial_state": dict(zip(vehicle.layout.states, state, strict=True)),
         "fit": fit,
-        "findings": [finding.to_json() for finding in (*recording.findings, *findings)],
+        "explains": assessment.explains if fit else None,
+        "warnings": [finding.to_json() for finding in (*known, *recording.findings, *findings)],
     }
     terminal.emit(content, lambda: show(began, content["initial_state"], fit))
     with fresh_file(out, overwrite, inputs) as path:
@@ -77,7 +79,7 @@ def with_every_channel(recording: Recording, vehicle: AbstractVehicle) -> Record
     table = {c: recording.column(c) for c in channels if c not in absent}
     nothing = np.full(len(recording.times), np.nan)
     columns = recording.columns | table | dict.fromkeys(absent, nothing)
-    return Recording(recording.name, recording.times, columns, recording.source, recording.first_row)
+    return dataclasses.replace(recording, columns=columns)
 
 
 def initial_state(
@@ -115,22 +117,40 @@ def _require_prompt(vehicle: AbstractVehicle, runs: Runs, where: str) -> None:
             raise InputError(where, what, "give --start estimated, or cut the run there")
 
 
-def errors(vehicle: AbstractVehicle, runs: Runs, shown: Float[Array, "1 k c"]) -> dict[str, dict[str, Any]]:
-    """By measured channel its samples, unit, rms error in SI units, the file's σ and rms/σ, where σ is stated."""
+def errors(
+    vehicle: AbstractVehicle, runs: Runs, shown: Float[Array, "1 k c"]
+) -> tuple[dict[str, dict[str, Any]], Assessment]:
+    """The tests of the simulation error, and by measured channel its samples, unit, rms in SI units, the file's σ and
+    rms/σ, the latter where σ is stated."""
     layout = vehicle.layout
-    rms = channel_rms(residual_outputs(vehicle, runs, shown), runs, layout.channels)
-    counts = dict(zip(layout.channels, np.asarray(runs.samples()).tolist(), strict=True))
-    return {
+    error = residual_outputs(vehicle, runs, shown)
+    rms = channel_rms(error, runs, layout.channels)
+    known = [one.sigma is not None for one in layout.outputs]
+    sigma = np.array([rms[one.channel] or 1.0 if one.sigma is None else one.sigma for one in layout.outputs])
+    assessment = assess_residuals(layout.channels, np.asarray(error) / sigma, np.asarray(runs.mask), known=known)
+    stated = {one.channel: one.sigma for one in layout.outputs}
+    table = {
         one.channel: {
-            "samples": counts[one.channel],
+            "samples": one.samples,
             "unit": layout.unit(one.channel),
             "rms": rms[one.channel],
-            "sigma": one.sigma,
-            "rms_over_sigma": None if one.sigma is None else rms[one.channel] / one.sigma,
+            "sigma": stated[one.channel],
+            "rms_over_sigma": one.rms if one.known else None,
+            "white_p_value": one.white,
         }
-        for one in layout.outputs
-        if counts[one.channel]
+        for one in assessment.channels
     }
+    return table, assessment
+
+
+def unexplained(assessment: Assessment, where: str) -> list[Finding]:
+    """A warning, unless the model explains the run or nothing of it was measured."""
+    if not assessment.channels or assessment.explains:
+        return []
+    what = f"the model does not explain this run: {assessment.reason()}"
+    return [
+        Finding("unexplained-runs", "warning", where, what, "fit it by `jaxsub identify`, or try `jaxsub diagnose`")
+    ]
 
 
 def answer(vehicle: AbstractVehicle, recording: Recording, shown: Float[np.ndarray, "k c"], out: Path) -> Recording:

@@ -8,12 +8,14 @@ import numpy as np
 from ..effects import FORCE_UNITS, AbstractEffect
 from ..errors import InputError
 from ..estimate import Fit, fit
+from ..findings import Finding
 from ..recording import Recording
 from ..results import RESULTS
-from ..vehicle import AbstractVehicle
+from ..vehicle import AbstractVehicle, vehicle_findings
 from .advice import next_manoeuvre
 from .ahead import in_pieces
 from .batch import batch
+from .consistency import assessed, compared, consistent
 from .diagnosis import Candidate, Diagnosis, Gain, Location, Physics, Rival
 from .examine import examine
 from .explain import explained
@@ -25,9 +27,10 @@ from .process_noise import noise_note, noise_signals
 from .progress import Progress
 from .show import HeldOut, channel_quality, coefficients, estimates, luck, overlays, run_quality, trades
 from .stand_in import described
+from .summary import summary
 from .trial import Found, Model, Trial
 from .validation import beyond_noise, remainders
-from .verdict import Judged, summary
+from .verdict import Judged
 from .view import View, look
 
 # that a next manoeuvre is to tell from what was named
@@ -90,18 +93,22 @@ def _told(
     layout, before, after = vehicle.layout, baseline.shown, best.shown
     start = allowing_for(baseline.view, baseline.fit)
     improved = allowing_for(best.view, best.fit) if best.added else start
+    sigma = np.asarray(start.sigma)
+    standing = best.added[len(named.added) :]
+    models = [("baseline", before), *([("improved", after)] if best.added else [])]
+    remains = {label: remainders(shown.error, held, layout, sigma) for label, shown in models}
+    channels = channel_quality(improved)
+    assessment = assessed(after.error, held, layout.channels, sigma)
+    found = compared(before.rms, after.rms, remains["baseline"], channels, assessment)
+    judged = consistent(judged, found, remains[models[-1][0]])
     where = _where(judged, first, field, train)
     own = improved if named is best else allowing_for(named.view, named.fit)
     physics = [_physics(one, own) for one in judged.named]
-    standing = best.added[len(named.added) :]
-    models = [("baseline", before), *([("improved", after)] if best.added else [])]
-    sigma = np.asarray(start.sigma)
     in_units = lambda rms: {c: value * float(s) for (c, value), s in zip(rms.items(), sigma, strict=True)}
-    remains = {label: remainders(shown.error, held, layout, sigma) for label, shown in models}
     diagnosis = Diagnosis(
         verdict=judged.verdict,
         vehicle=layout.name,
-        summary=summary(judged.verdict, physics, where, standing),
+        summary=summary(judged.verdict, physics, where, standing, found, judged.p_value),
         p_value=judged.p_value,
         where=where,
         physics=physics,
@@ -114,7 +121,7 @@ def _told(
         remaining_forces=traces(best.view, train) if best.added else field.traces,
         overlays=overlays(held, layout.channels, before, after),
         coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, start, improved),
-        channels=channel_quality(improved),
+        channels=channels,
         runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
         notes=[
             *judged.notes,
@@ -129,8 +136,16 @@ def _told(
         gain=_gain(before, after) if best.added else None,
         history=[(label, in_units(shown.rms)) for label, shown in models],
         explanations=_explanations(judged, improved.vehicle),
+        explained=found,
+        findings=_findings(vehicle, [*train, *held]),
     )
     return diagnosis, improved.vehicle
+
+
+def _findings(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> tuple[Finding, ...]:
+    """What is odd about the vehicle, and what reading and checking the recordings found, of pieces of one run once."""
+    of_runs = (finding for run in recordings for finding in run.findings)
+    return tuple(dict.fromkeys([*vehicle_findings(vehicle, vehicle.layout.name), *of_runs]))
 
 
 def _gain(before: HeldOut, after: HeldOut) -> Gain:

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..findings import Finding
 from ..vehicle import AbstractVehicle
 
 Verdict = Literal["none", "named", "ambiguous", "unknown"]
@@ -161,6 +162,24 @@ class Gain:
 
 
 @dataclasses.dataclass(frozen=True)
+class Explained:
+    """What the effects that were found remove of the simulation error on the test runs.
+
+    **Fields**
+
+    - `share`: of the baseline's excess variance over the noise, what the improved model removes; None where the
+      baseline leaves no significant excess, or one of the two diverges.
+    - `left`: rms/σ of the channels in which the improved model leaves significantly more than noise.
+    - `baseline_runs`, `improved_runs`: whether each runs through the test runs without diverging.
+    """
+
+    share: float | None
+    left: dict[str, float]
+    baseline_runs: bool = True
+    improved_runs: bool = True
+
+
+@dataclasses.dataclass(frozen=True)
 class Coefficient:
     """One free number before and after; `verdict` is `identified`, `weak` (standard error above half its size), or
     `not excited` (the recordings leave it open)."""
@@ -212,7 +231,8 @@ class Diagnosis:
     certain. `kinds` is how probable it is that something is wrong with the vehicle's structure, an actuator, a sensor
     or the environment, by what was accepted and its rivals; where nothing was, by what a first look finds most of,
     which may be random forces and noise alone (`disturbance`). `file_p_value` is how probable the numbers found are
-    where those of the vehicle file are right.
+    where those of the vehicle file are right. `explained` is what the effects remove of the test runs' error, and
+    `findings` is what reading and checking the recordings found.
     """
 
     verdict: Verdict
@@ -237,6 +257,8 @@ class Diagnosis:
     gain: Gain | None = None
     history: list[tuple[str, dict[str, float]]] = dataclasses.field(default_factory=list)
     explanations: tuple[AbstractVehicle, ...] = ()
+    explained: Explained | None = None
+    findings: tuple[Finding, ...] = ()
 
     @property
     def improves(self) -> bool:
@@ -289,7 +311,10 @@ class Diagnosis:
             "held_out_checks": {
                 model: {channel: one.to_json() for channel, one in left.items()} for model, left in self.remains.items()
             },
+            "explained": self.explained.share if self.explained else None,
+            "left": self.explained.left if self.explained else {},
             "held_out_gain": dataclasses.asdict(self.gain) if self.gain else None,
             "next_manoeuvre": self.next_manoeuvre,
             "notes": self.notes,
+            "warnings": [finding.to_json() for finding in self.findings],
         }

@@ -37,13 +37,13 @@ def remainders(
     Inputs are all that drives the model: actuators, prescribed motions and surroundings.
     """
     signals = (*layout.inputs, *layout.prescribed, *layout.environment)
-    moved = {name: _stacked([run.column(column) for run in recordings]) for name, column in signals}
+    moved = {name: stacked_columns([run.column(column) for run in recordings]) for name, column in signals}
     inputs = {name: _about_mean(*one) for name, one in moved.items()}
     inputs = {name: (values, there) for name, (values, there) in inputs.items() if np.any(values)}
     step = float(np.median(np.concatenate([np.diff(run.times) for run in recordings])))
     found = {}
     for i, channel in enumerate(layout.channels):
-        _, measured = _stacked([run.column(channel) for run in recordings])
+        _, measured = stacked_columns([run.column(channel) for run in recordings])
         own = np.stack([run[: measured.shape[1], i] / sigma[i] for run in error])
         found[channel] = _remainder(np.where(measured, own, 0.0), measured, inputs, step)
     return found
@@ -131,7 +131,7 @@ def _lagged(later: np.ndarray, earlier: np.ndarray, most: int) -> Float[np.ndarr
     return total[np.arange(-most, most + 1)]
 
 
-def _stacked(columns: Sequence[np.ndarray]) -> tuple[Samples, Bool[np.ndarray, "r k"]]:
+def stacked_columns(columns: Sequence[np.ndarray]) -> tuple[Samples, Bool[np.ndarray, "r k"]]:
     """Columns of runs made up to one length, and where they have samples."""
     values = np.full((len(columns), max(map(len, columns))), np.nan)
     for row, column in zip(values, columns, strict=True):

@@ -4,8 +4,9 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from ..effects import AbstractEffect, SmoothForce
-from .diagnosis import Location, Physics, Verdict
+from ..effects import AbstractEffect
+from ..plain import finite_text
+from .diagnosis import Verdict
 from .generic import Pattern
 from .name import Named, Naming
 from .show import Luck
@@ -78,13 +79,14 @@ def helped(judged: Judged, effect: AbstractEffect, gain: Luck) -> Judged:
 
 def _gain_said(label: str, gain: Luck) -> str:
     if gain.helps and gain.freely:
-        said = f"With {label} free runs through the held-out runs leave {gain.free:.0%} of their squared errors; "
-        return said + f"that this is luck has probability {gain.free_probability:.2g}."
+        left = finite_text(gain.free, ".0%")
+        start = f"With {label} free runs through the held-out runs leave {left} of their squared errors; "
+        return start + f"that this is luck has probability {gain.free_probability:.2g}."
     if gain.helps and not math.isfinite(gain.likelihood):
         return f"Without {label} the model diverges along the held-out runs."
     if gain.helps:
-        said = f"With {label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
-        return said + f"that this is luck has probability {gain.probability:.2g}."
+        start = f"With {label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
+        return start + f"that this is luck has probability {gain.probability:.2g}."
     worse = "the held-out runs worse"
     why = worse if gain.sound else "with numbers that physics does not admit or the runs do not tell"
     return f"{label} fitted the training runs better but {why}, and is not accepted."
@@ -132,25 +134,3 @@ def settled(judged: Judged, stand: list[Named]) -> Judged:
 
 def _certainty(named: Sequence[Named]) -> Verdict:
     return "named" if all(one.probability >= CERTAIN for one in named) else "ambiguous"
-
-
-def summary(verdict: Verdict, physics: list[Physics], where: list[Location], standing: Sequence[AbstractEffect]) -> str:
-    """The verdict in a sentence, and one on effects that are in the model and were not named."""
-    forces = [effect for effect in standing if isinstance(effect, SmoothForce)]
-    said = [effect.label for effect in standing if effect not in forces]
-    said += [f"a smooth force in {force.equation}" for force in forces]
-    added = f" What has no name is described, its cause unclaimed, by {', '.join(said)}." if said else ""
-    return _verdict_said(verdict, physics, where) + added
-
-
-def _verdict_said(verdict: Verdict, physics: list[Physics], where: list[Location]) -> str:
-    places = " and ".join(place.where for place in where[:2]) or "no equation"
-    names = ", then ".join(found.effect for found in physics)
-    if verdict == "none":
-        return "The model explains the recordings: nothing significant is left in the residuals."
-    if verdict == "named":
-        return f"The model leaves out {names}, felt in {places}; with it the held-out runs fit better."
-    if verdict == "ambiguous":
-        rivals = sorted({rival.effect for found in physics for rival in found.rivals})
-        return f"Something is missing in {places}: {names}, but these runs cannot tell it from {', '.join(rivals)}."
-    return f"Something is missing in {places}, and nothing in the vocabulary explains it."

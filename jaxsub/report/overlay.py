@@ -67,7 +67,7 @@ def _render(
         known = quality.get(name)
         _outputs(above, overlay, name, improved)
         above.set_title(drawable(symbol(name)), fontweight="bold")
-        above.set_ylabel(unit(known.unit) if known else "SI unit")
+        above.set_ylabel(drawable(unit(known.unit)) if known else "SI unit")
         _residuals(below, overlay, name, known.sigma if known else 1.0, improved)
         below.set_ylabel("residual/σ")
     figure.suptitle(f"Not fitted: run {drawable(overlay.run, 40)}", x=0.01, ha="left", fontsize=10.5)

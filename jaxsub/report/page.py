@@ -49,7 +49,7 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
         "diagnosis": diagnosis,
         "verdict": _VERDICTS[diagnosis.verdict],
         "pictures": pictures,
-        "kinds": _KINDS,
+        "kinds": {kind: _KINDS.get(kind, kind) for kind in diagnosis.kinds},
         "effects": tables.effects_text(vehicle_text) if diagnosis.improves else "",
         "key_numbers": _key_numbers(diagnosis),
         "force_run": telling_trace(diagnosis),
@@ -58,6 +58,7 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
         "fit_columns": tables.fit_columns(diagnosis),
         "fit_rows": tables.fit_rows(diagnosis),
         "check_rows": tables.check_rows(diagnosis),
+        "findings": tables.finding_rows(diagnosis.findings),
         "channel_rows": tables.channel_rows(diagnosis),
     }
     return _environment().get_template("template.html.j2").render(context)
@@ -76,6 +77,7 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
+        finalize=text.visible,
     )
     environment.filters.update(
         number=text.number,

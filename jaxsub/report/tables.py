@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location, Regime, Remainder
 from ..discrepancy.validation import CHANCE
+from ..findings import Finding
 from .text import UNKNOWN, formula, number, p_value, ratio, symbol, unit
 
 _MOST_INTERVALS = 6  # of one run; more are counted
@@ -104,6 +105,12 @@ def channel_rows(diagnosis: Diagnosis) -> list[ChannelRow]:
         other = factor > _SAME_SIGMA or factor < 1.0 / _SAME_SIGMA
         rows.append(ChannelRow(quality, factor, other and not quality.sigma_estimated))
     return rows
+
+
+def finding_rows(findings: Sequence[Finding]) -> list[Finding]:
+    """What checks found, the gravest first."""
+    order = ("error", "warning", "note")
+    return sorted(findings, key=lambda finding: order.index(finding.severity))
 
 
 def gain_number(diagnosis: Diagnosis) -> KeyNumber | None:

@@ -2,7 +2,9 @@
 
 import math
 import re
+import unicodedata
 from decimal import Decimal
+from typing import Any
 
 from markupsafe import Markup, escape
 
@@ -77,6 +79,17 @@ def ratio(value: float | None) -> str:
     return f"{value:.2f}" if value < 9.995 else f"{value:.1f}" if value < 99.95 else number(value, 3)
 
 
+def visible(value: Any) -> Any:
+    """`value` with its control characters, such as those that reverse the order of letters, as their code points.
+
+    What is no text stays, and what was marked as safe stays so. Line breaks and tabs stay.
+    """
+    if not isinstance(value, str) or all(map(_shows, value)):
+        return value
+    shown = "".join(letter if _shows(letter) else f"[U+{ord(letter):04X}]" for letter in value)
+    return Markup(shown) if isinstance(value, Markup) else shown
+
+
 def symbol(name: str) -> str:
     """`φ` for `phi`; other names as they are."""
     return _GREEK.get(name, name)
@@ -133,3 +146,8 @@ def _strip(text: str) -> str:
 def _signed(text: str) -> str:
     negative = text.startswith("-") and text.strip("-0.") != ""
     return f"{MINUS}{text[1:]}" if negative else text.lstrip("-")
+
+
+def _shows(letter: str) -> bool:
+    # narrow and no-break spaces are set on purpose, and count as not printable
+    return letter.isprintable() or letter in "\n\t" or unicodedata.category(letter) == "Zs"

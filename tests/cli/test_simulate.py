@@ -121,7 +121,7 @@ def test_a_run_without_outputs_starts_at_rest_and_says_so(rig, monkeypatch, caps
     assert "no sample of x, x_rate" in said.err
     found = told(monkeypatch, capsys, rig, "--overwrite", run="changed.csv")
     assert found["start"] == "rest" and found["fit"] == {}
-    assert [one["check"] for one in found["findings"]] == ["initial-state"]
+    assert [one["check"] for one in found["warnings"]] == ["initial-state"]
 
 
 def test_one_of_two_channels_is_enough(rig, monkeypatch, capsys):

@@ -11,6 +11,7 @@ from jaxsub.discrepancy.diagnosis import (
     Coefficient,
     Diagnosis,
     Estimate,
+    Explained,
     Gain,
     Location,
     Physics,
@@ -19,6 +20,7 @@ from jaxsub.discrepancy.diagnosis import (
     Rival,
     RunQuality,
 )
+from jaxsub.findings import Finding
 
 VEHICLE = """schema = 1
 name = "NPS AUV II"
@@ -37,6 +39,15 @@ expression = "-½ρD C_d ∫ (1, x) |v + x r|(v + x r) dx"
 [effects.parameters]
 C_d = { value = 0.6137, bounds = [0.0, inf] }
 """
+
+
+FINDINGS = (
+    Finding(
+        "sentinel", "warning", "runs/zigzag-2.csv", "100 samples (8.3 %) of -32.768 masked as a sentinel",
+        "check the logger", "z", ((120, 219),), ((11.8, 21.7),), 100,
+    ),
+    Finding("header-row", "note", "runs/turns-1.csv", "row 2 was read as the units of the columns"),
+)  # fmt: skip
 
 
 def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, described: bool = False) -> Diagnosis:
@@ -76,6 +87,8 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
         gain=Gain(0.12, 0.0005) if found else None,
         kinds={"structure": 0.9712, "disturbance": 0.0288, "sensor": 3e-12} if missing else {"disturbance": 1.0},
         file_p_value=3.2e-9,
+        explained=Explained(0.97 if found else None, {}),
+        findings=FINDINGS,
     )  # fmt: skip
 
 

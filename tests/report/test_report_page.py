@@ -78,7 +78,7 @@ def test_verdict_chooses_sections(page, verdict, badge, sections):
     text = page(verdict)
     outline = Outline(text)
     assert f'<span class="badge {verdict}">{badge}</span>' in text
-    assert set(outline.ids) == sections | {"coefficients", "data", "notes"}
+    assert set(outline.ids) == sections | {"coefficients", "data", "recordings", "notes"}
     accepted = "term" in sections
     assert (">improved</th>" in text) == accepted
     assert ("[[effects]]" in outline.text) == accepted
@@ -130,6 +130,16 @@ def test_what_is_not_random_or_goes_with_an_input_is_flagged():
     table = text[text.index("What remains there") :].split("</table>")[0]
     assert table.count(" flag") == sum((left.independent < 1e-3) + (left.random < 1e-3) for left in remains)
     assert "keep 12\u202f% of their squared error" in Outline(text).text.replace("\xa0", "\u202f")
+
+
+def test_what_checks_found_is_a_section_of_its_own():
+    """Claim: every finding is there with its place and remedy, the gravest first; without one there is no section."""
+    made = diagnosis("named")
+    text = Outline(render(dataclasses.replace(made, findings=made.findings[::-1]), VEHICLE, {})).text
+    shown = text[text.index("Checks of the recordings") :]
+    assert shown.index("masked as a sentinel") < shown.index("read as the units")
+    assert "runs/zigzag-2.csv, rows 120 to 219, column 'z'" in shown and "check the logger" in shown
+    assert "Checks of the recordings" not in render(dataclasses.replace(made, findings=()), VEHICLE, {})
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)

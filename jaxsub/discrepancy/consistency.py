@@ -1,0 +1,78 @@
+r"""What the simulation error on the test runs says of a verdict: how much of it is explained, and what is left.
+
+The excess variance of a channel is $\overline{e^2}/\sigma^2 - n$, of which the noise floor $n$ is 1 where σ is stated,
+and the white part of the recording where it is not.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ..estimate.assessment import Assessment, assess_residuals
+from ..recording import Recording
+from .diagnosis import ChannelQuality, Explained, Remainder
+from .validation import stacked_columns
+from .verdict import Judged
+
+# rms/σ: a test run's error is far above its noise where its 95 % interval lies above, which no `none` may leave
+FAR = 2.0
+_SHOWN = 4
+
+
+def compared(
+    before: Mapping[str, float],
+    after: Mapping[str, float],
+    baseline: Mapping[str, Remainder],
+    quality: Sequence[ChannelQuality],
+    assessment: Assessment,
+) -> Explained:
+    """What the improved model removes of the baseline's excess variance on the test runs, and what it leaves.
+
+    `before` and `after` are rms/σ of the two models there by channel, `baseline` is what the first one leaves, and
+    `assessment` has the tests of what the second one leaves.
+    """
+    floor = {one.channel: (one.record_sigma / one.sigma) ** 2 if one.sigma_estimated else 1.0 for one in quality}
+    excess = lambda rms: sum(max(value**2 - floor[channel], 0.0) for channel, value in rms.items())
+    runs = all(math.isfinite(value) for value in before.values())
+    # a share of an excess that is none would be noise over noise
+    significant = any(one.low**2 > floor[channel] for channel, one in baseline.items())
+    share = 1.0 - excess(after) / excess(before) if runs and assessment.runs_model and significant else None
+    left = {one.channel: after[one.channel] for one in assessment.oversized}
+    return Explained(share, left, runs, assessment.runs_model)
+
+
+def assessed(
+    error: Sequence[Float[np.ndarray, "k c"]],
+    recordings: Sequence[Recording],
+    channels: Sequence[str],
+    sigma: Float[np.ndarray, " c"],
+) -> Assessment:
+    """The tests of size, whiteness and spikes of a model's simulation `error` on `recordings`, a run each, in SI."""
+    pairs = [stacked_columns([run.column(channel) for run in recordings]) for channel in channels]
+    mask = np.stack([there for _, there in pairs], axis=-1)
+    whitened = np.stack([run[: mask.shape[1]] / sigma for run in error])
+    return assess_residuals(channels, np.where(mask, whitened, 0.0), mask)
+
+
+def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder]) -> Judged:
+    """The verdict, unless it is `none` and the test runs' error is far above the noise: then `unknown`, and why.
+
+    `remains` is what the last model leaves of each channel there.
+    """
+    far = {channel: rms for channel, rms in found.left.items() if remains[channel].low > FAR}
+    if judged.verdict != "none" or (found.improved_runs and not far):
+        return judged
+    large = f"Simulation error on the test runs is {sigmas(far)}"
+    why = large if found.improved_runs else "The model diverges on the test runs"
+    note = f"{why}, although no missing effect is significant: the verdict is unknown and not none."
+    return dataclasses.replace(judged, verdict="unknown", notes=[*judged.notes, note])
+
+
+def sigmas(rms: Mapping[str, float]) -> str:
+    """`1.4 σ in psi, 1.2 σ in r`, the largest first."""
+    ranked = sorted(rms.items(), key=lambda item: -item[1])
+    more = f" and more than noise in {len(ranked) - _SHOWN} others" if len(ranked) > _SHOWN else ""
+    return ", ".join(f"{value:.3g} σ in {channel}" for channel, value in ranked[:_SHOWN]) + more

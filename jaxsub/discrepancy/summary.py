@@ -1,0 +1,87 @@
+"""The verdict in sentences, with what the test runs say of it."""
+
+from collections.abc import Sequence
+
+from ..effects import AbstractEffect, SmoothForce
+from .consistency import sigmas
+from .diagnosis import Explained, Location, Physics, Verdict
+
+# p-value of a mismatch below which training runs alone would call it significant
+_SIGNIFICANT = 0.01
+
+
+def summary(
+    verdict: Verdict,
+    physics: Sequence[Physics],
+    where: Sequence[Location],
+    standing: Sequence[AbstractEffect],
+    found: Explained,
+    p_value: float,
+) -> str:
+    """The verdict, what is `explained` and left of the test runs' error, and effects that describe without a name."""
+    forces = [effect for effect in standing if isinstance(effect, SmoothForce)]
+    described = [effect.label for effect in standing if effect not in forces]
+    described += [f"a smooth force in {force.equation}" for force in forces]
+    added = f" {', '.join(described)} describe what has no name, and claim no cause." if described else ""
+    said = [_verdict(verdict, physics, where, found, p_value) + added]
+    if physics or standing:
+        said.append(explained_sentence(found))
+    elif verdict == "unknown":
+        said.append(_test_error(found))
+    return " ".join(said)
+
+
+def explained_sentence(found: Explained) -> str:
+    """What the improved model removes of the test runs' excess variance, and what it leaves."""
+    if not (found.baseline_runs and found.improved_runs):
+        return _test_error(found)
+    if found.share is None:
+        return f"On the test run the baseline's simulation error is within its noise too. {_test_error(found)}"
+    if found.share <= 0.0:
+        return f"The improved model does not reduce the simulation error on the test run. {_test_error(found)}"
+    left = [f"{channel} is left at {value:.3g} σ" for channel, value in found.left.items()]
+    return (
+        f"The improved model removes {_percent(found.share)} of the test run's excess variance; "
+        f"{', '.join(left) or 'no channel is left above its noise'}."
+    )
+
+
+def _verdict(
+    verdict: Verdict, physics: Sequence[Physics], where: Sequence[Location], found: Explained, p_value: float
+) -> str:
+    places = " and ".join(place.where for place in where[:2]) or "no equation"
+    names = ", then ".join(one.effect for one in physics)
+    if verdict == "none":
+        return _nothing(found, p_value)
+    if verdict == "named":
+        return f"The model lacks {names}, which acts in {places}."
+    if verdict == "ambiguous":
+        rivals = sorted({rival.effect for one in physics for rival in one.rivals})
+        others = f", but these runs cannot tell it from {', '.join(rivals)}" if rivals else ", but not with certainty"
+        return f"Something is missing in {places}: {names}{others}."
+    if not where:
+        return "The recordings are not explained, and no missing effect is significant in any equation."
+    return f"Something is missing in {places}, and nothing in the vocabulary explains it."
+
+
+def _nothing(found: Explained, p_value: float) -> str:
+    start = "No missing effect is significant" if p_value >= _SIGNIFICANT else "No missing effect holds on the test run"
+    if not found.left:
+        return f"{start}: the model explains the recordings, and the test run to its noise."
+    return f"{start}, but the simulation error on the test run is more than its noise: {sigmas(found.left)}."
+
+
+def _test_error(found: Explained) -> str:
+    """How the last model simulates the test runs."""
+    if not found.improved_runs:
+        return "The model diverges on the test run."
+    start = "" if found.baseline_runs else "The baseline diverges on the test run. "
+    size = f"is {sigmas(found.left)}" if found.left else "is no more than its noise"
+    return f"{start}Simulation error on the test run {size}."
+
+
+def _percent(share: float) -> str:
+    """In whole percent, and all only where nothing is left."""
+    if share >= 1.0:
+        return "all"
+    return "more than 99 %" if share > 0.995 else "less than 1 %" if share < 0.005 else f"{100.0 * share:.0f} %"
