@@ -15,6 +15,7 @@ import dataclasses
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -57,34 +58,33 @@ def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None) -> Col
 
     The `disturbance` is estimated from the residuals where none is given. Coefficients at a bound are held there.
     """
-    reduced = _reduced(fit.problem, fit.model, fit.pressed != 0.0)
+    problem, model = fit.problem, fit.model
+    reduced = _reduced(problem, model, fit.pressed != 0.0)
     if disturbance is None:
-        disturbance = _estimated(reduced)
-    return Coloured(_sandwich(reduced, disturbance), disturbance, fit.names)
+        disturbance = _estimated(*_windows(problem, model), reduced)
+    return Coloured(_sandwich(problem, model, reduced, disturbance), disturbance, fit.names)
 
 
 class _Reduced(NamedTuple):
-    """A fit's whitened columns by directions of unit information.
+    """A fit's directions of unit information.
 
-    `left` (R, K, c, p) is what initial states cannot follow, `pinned` (p, p) what priors tell, `basis` and `untold`
-    (p, p) the directions that anything tells and the others, `columns` the residual and its columns along the `basis`,
-    `prior` the products of their priors.
+    `gain` (R, s, p) is how initial states follow the coefficients, `pinned` (p, p) what priors tell, `basis` and
+    `untold` (p, p) the directions that anything tells and the others, `prior` the products of the priors of the
+    residual and of the columns along the `basis`. `held` (p,) are at a bound.
     """
 
-    system: System
-    columns: Columns
-    prior: Array
-    left: Array
+    gain: Array
     pinned: Array
     basis: Array
     untold: Array
+    prior: Array
+    held: Array
 
 
 @eqx.filter_jit
 def _reduced(problem: Problem, model: Linearised, held: Bool[Array, " p"]) -> _Reduced:
-    theta, start, residual = whitened_columns(problem, model)
-    # a coefficient at its bound is held there
-    theta, precision = jnp.where(held, 0.0, theta), jnp.where(held, 1.0, problem.prior_std**-2.0)
+    theta, start, _ = _columns(problem, model, held)
+    precision = jnp.where(held, 1.0, problem.prior_std**-2.0)
     own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(start.shape[3])
     gain = jnp.linalg.solve(own, jnp.einsum("rkcs,rkcp->rsp", start, theta))
     # what is left of the columns once the initial states have followed, and what their priors then say
@@ -100,48 +100,53 @@ def _reduced(problem: Problem, model: Linearised, held: Bool[Array, " p"]) -> _R
     # a direction that nothing tells has an empty column, and must not make the matrix of the others singular
     empty = jnp.all(basis == 0.0, axis=0)
     prior = prior.at[1:, 1:].add(jnp.diag(jnp.where(empty, 1.0, 0.0)))
+    return _Reduced(gain, pinned, basis, untold, prior, held)
+
+
+@eqx.filter_jit
+def _estimated(problem: Problem, model: Linearised, reduced: _Reduced) -> Disturbance:
+    """The disturbance of the residuals."""
+    theta, _, residual = _columns(problem, model, reduced.held)
     system = System.of(model, problem.runs, problem.sigma, problem.spread)
-    columns = Columns(jnp.concatenate([residual[..., None], theta @ basis], axis=-1))
-    return _Reduced(system, columns, prior, left, pinned, basis, untold)
+    columns = Columns(jnp.concatenate([residual[..., None], theta @ reduced.basis], axis=-1))
+    return estimate_disturbance(system, columns, reduced.prior, first_guess(system, residual))
 
 
-def _estimated(reduced: _Reduced) -> Disturbance:
-    """The disturbance of the residuals; of long runs, of windows spread over them."""
-    system, columns = _windows(reduced.system, reduced.columns)
-    return estimate_disturbance(system, columns, reduced.prior, first_guess(system, columns.shown[..., 0]))
+@eqx.filter_jit
+def _sandwich(problem: Problem, model: Linearised, reduced: _Reduced, disturbance: Disturbance) -> Float[Array, "p p"]:
+    """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
+    theta, start, _ = _columns(problem, model, reduced.held)
+    system = System.of(model, problem.runs, problem.sigma, problem.spread)
+    basis, untold = reduced.basis, reduced.untold
+    left = theta - start @ reduced.gain[:, None]
+    middle = basis.T @ (carried(disturbance, system, left) + reduced.pinned) @ basis
+    return basis @ middle @ basis.T + untold @ untold.T
 
 
-def _windows(system: System, columns: Columns) -> tuple[System, Columns]:
+def _windows(problem: Problem, model: Linearised) -> tuple[Problem, Linearised]:
     """All of it where that is no more than `_WINDOWS` windows of `_LENGTH` samples, else so many spread evenly."""
-    count, samples = system.measured.shape[:2]
+    runs = problem.runs
+    count, samples = runs.times.shape
     if count * samples <= _WINDOWS * _LENGTH:
-        return system, columns
+        return problem, model
     length = min(samples, _LENGTH)
     chosen = np.linspace(0, count - 1, min(count, _WINDOWS)).round().astype(int)
     begins = np.linspace(0, samples - length, max(1, _WINDOWS // len(chosen))).round().astype(int)
 
-    def cut(array: Array, length: int = length) -> Array:
+    def cut(array: Array) -> Array:
         """The windows, by NumPy, for which no program has to be made."""
-        return jnp.asarray(np.stack([np.asarray(array[r])[a : a + length] for r in chosen for a in begins]))
+        short = length - (samples - array.shape[1])
+        return jnp.asarray(np.stack([np.asarray(array[r])[a : a + short] for r in chosen for a in begins]))
 
-    steps = lambda array: cut(array, length - 1)
-    found = dataclasses.replace(
-        system,
-        A=steps(system.A),
-        G=steps(system.G),
-        C=cut(system.C),
-        measured=cut(system.measured),
-        intervals=steps(system.intervals),
-    )
-    return found, Columns(cut(columns.shown))
+    arrays = ("times", "step_of", "live", "signals", "outputs", "mask")
+    runs = dataclasses.replace(runs, **{name: cut(getattr(runs, name)) for name in arrays})
+    return dataclasses.replace(problem, runs=runs), jax.tree.map(cut, model)
 
 
-@eqx.filter_jit
-def _sandwich(reduced: _Reduced, disturbance: Disturbance) -> Float[Array, "p p"]:
-    """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
-    basis, untold = reduced.basis, reduced.untold
-    middle = basis.T @ (carried(disturbance, reduced.system, reduced.left) + reduced.pinned) @ basis
-    return basis @ middle @ basis.T + untold @ untold.T
+def _columns(problem: Problem, model: Linearised, held: Array) -> tuple[Array, Array, Array]:
+    """`whitened_columns`, those of coefficients at a bound empty."""
+    theta, start, residual = whitened_columns(problem, model)
+    return jnp.where(held, 0.0, theta), start, residual
 
 
 def whitened_columns(problem: Problem, model: Linearised) -> tuple[Array, Array, Array]:

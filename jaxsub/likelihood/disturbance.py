@@ -185,30 +185,26 @@ def carried(disturbance: Disturbance, system: System, weights: Float[Array, "r k
     lever on the state, $a_k$ theirs on the force and $f_k = a_k + \rho_k f_{k+1}$, forces of unit variance contribute
     $\sum_k a_kf_k^T + f_ka_k^T - a_ka_k^T$.
     """
-    n = len(disturbance.force)
-    rho = jnp.exp(-system.intervals[..., None] / disturbance.time)
-    before = lambda M: jnp.concatenate([jnp.zeros_like(M[:, :1]), M], axis=1)
+    n, (r, samples), p = len(disturbance.force), weights.shape[:2], weights.shape[-1]
+    turned = lambda M: jnp.swapaxes(M, -1, -2)
 
-    def step(carry: tuple[Array, Array, Array], at: tuple[Array, ...]) -> tuple[tuple[Array, Array, Array], None]:
+    def step(carry: tuple[Array, Array, Array], k: Array) -> tuple[tuple[Array, Array, Array], None]:
         lever, following, total = carry
-        A, begin, end, C, rho, weight = at
-        asked = begin.T @ lever
-        lever = C.T @ weight + A.T @ lever
-        asked = asked + end.T @ lever
-        following = asked + rho[:, None] * following
+        # arrays are indexed and not scanned over, so that none is copied; there is no interval after the last sample
+        interval = lambda M, k: jnp.where((k >= 0) & (k < samples - 1), M[:, jnp.clip(k, 0, samples - 2)], 0.0)
+        asked = turned(interval(system.G, k)[..., :n]) @ lever
+        lever = turned(system.C[:, k]) @ weights[:, k] + turned(interval(system.A, k)) @ lever
+        asked = asked + turned(interval(system.G, k - 1)[..., n:]) @ lever
+        rho = jnp.exp(-interval(system.intervals, k)[:, None] / disturbance.time)
+        following = asked + rho[..., None] * following
         scaled = disturbance.force[:, None] ** 2 * asked
-        total = total + scaled.T @ following + following.T @ scaled - scaled.T @ asked
-        return (lever, following, total), None
+        both = jnp.einsum("rnp,rnq->pq", scaled, following)
+        white = jnp.where(system.measured[:, k], disturbance.noise, 1.0)[..., None] * weights[:, k]
+        own = jnp.einsum("rcp,rcq->pq", white, white) - jnp.einsum("rnp,rnq->pq", scaled, asked)
+        return (lever, following, total + both + both.T + own), None
 
-    def run(*samples: Array) -> Array:
-        p, s = weights.shape[-1], system.A.shape[-1]
-        nothing = jnp.zeros((s, p)), jnp.zeros((n, p)), jnp.zeros((p, p))
-        return jax.lax.scan(step, nothing, samples, reverse=True)[0][2]
-
-    begin, end = beyond(system.G[..., :n]), before(system.G[..., n:])
-    forces = jax.vmap(run)(beyond(system.A), begin, end, system.C, beyond(rho), weights)
-    white = jnp.where(system.measured, disturbance.noise, 1.0)[..., None] * weights
-    return jnp.sum(forces, axis=0) + jnp.einsum("rkcp,rkcq->pq", white, white)
+    nothing = jnp.zeros((r, system.A.shape[-1], p)), jnp.zeros((r, n, p)), jnp.zeros((p, p))
+    return jax.lax.scan(step, nothing, jnp.arange(samples), reverse=True)[0][2]
 
 
 def covariance_derivatives(

@@ -5,6 +5,7 @@ $D_{k+1} = A_k D_k + f_k$, so all of them go through it as columns of one batch.
 the sampled step; nothing here depends on how many effects the vocabulary has.
 """
 
+import dataclasses
 from collections.abc import Callable
 
 import equinox as eqx
@@ -12,10 +13,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..effects import AbstractActuator, AbstractInstrument
 from ..recording.runs import Runs
 from ..simulate import Sampled
 from ..vehicle import AbstractVehicle
 from .output_error import residual_outputs
+
+# samples whose Jacobians are taken at once
+_AT_ONCE = 50_000
 
 
 class Linearised(eqx.Module):
@@ -105,11 +110,47 @@ def jacobians(
     return Jacobians(A, G, C, F, direct)
 
 
+def _jacobians_along(vehicle: AbstractVehicle, runs: Runs, states: Float[Array, "r k s"]) -> Jacobians:
+    """`jacobians` along `states`; of long runs piece by piece, so that intermediate results take a piece's memory."""
+    samples = states.shape[1]
+    pieces = -(-samples * len(states) // _AT_ONCE)
+    # an actuator's or a sensor's own dynamics need what came before a piece
+    if pieces <= 1 or any(isinstance(effect, AbstractActuator | AbstractInstrument) for effect in vehicle.effects):
+        return jacobians(vehicle, runs, states[:, :-1], states)
+    length = -(-(samples - 1) // pieces)
+    begins = length * jnp.arange(pieces)
+
+    def piece(begin: Array) -> Jacobians:
+        # the last begins earlier, so that all are of one length
+        begin = jnp.minimum(begin, samples - 1 - length)
+        cut = lambda array, more: jax.lax.dynamic_slice_in_dim(array, begin, length + more, axis=1)
+        short = dataclasses.replace(
+            runs,
+            times=cut(runs.times, 1),
+            step_of=cut(runs.step_of, 0),
+            live=cut(runs.live, 0),
+            signals=cut(runs.signals, 1),
+            outputs=cut(runs.outputs, 1),
+            mask=cut(runs.mask, 1),
+        )
+        at = cut(states, 1)
+        return jacobians(vehicle, short, at[:, :-1], at)
+
+    every = jax.lax.map(piece, begins)
+    last = samples - 1 - length * (pieces - 1)
+
+    def joined(parts: Array) -> Array:
+        whole = jnp.moveaxis(parts[:-1, :, :length], 0, 1).reshape(len(states), -1, *parts.shape[3:])
+        return jnp.concatenate([whole, parts[-1][:, length - last :]], axis=1)
+
+    return jax.tree.map(joined, every)
+
+
 @eqx.filter_jit
 def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
     """`vehicle` along its trajectory from the initial states `start`."""
     states = Sampled.of(vehicle, runs).states(runs, start)
-    by = jacobians(vehicle, runs, states[:, :-1], states)
+    by = _jacobians_along(vehicle, runs, states)
     r, k1, s, p = by.F.shape
     forcing = jnp.concatenate([by.F, jnp.zeros((r, k1, s, s))], axis=-1)
     origin = jnp.broadcast_to(jnp.concatenate([jnp.zeros((s, p)), jnp.eye(s)], 1), (r, s, p + s))
