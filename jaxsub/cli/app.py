@@ -156,6 +156,7 @@ def channels(log: Path, words: tuple[str, ...]) -> None:
 @click.option("--compiled", is_flag=True, help="By C made of the model: many times faster; needs .[control] and cc.")
 @click.option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local for one worker a core of this machine.")
 @_overwrite
+@common
 def sweep(out: Path, overwrite: bool, **arguments: Any) -> None:
     """Monte-Carlo over initial guesses; goes on with what is in --out already."""
     from . import sweep as command

@@ -3,7 +3,7 @@
 import errno
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import click
@@ -84,7 +84,8 @@ def fresh_folder(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Ite
     **Raises** `InputError` where `out` may not be replaced (`require_replaceable`), where another process writes there
     and where nothing can be written there; `OutputError` where writing fails later.
     """
-    with _beside(out, overwrite, inputs) as folder:
+    require_replaceable(out, overwrite, inputs)
+    with claimed(out) as folder:
         new = folder / "new" / out.resolve().name
         new.mkdir(parents=True)
         with _told_of(new, out):
@@ -104,7 +105,8 @@ def fresh_file(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Itera
     if out.is_dir() and not out.is_symlink():
         raise InputError(str(out), "is a folder", "give --out a file")
     manifest = Manifest.of_file(out)
-    with _beside(out, overwrite, inputs) as folder:
+    require_replaceable(out, overwrite, inputs)
+    with claimed(out) as folder:
         new = folder / out.name
         with _told_of(new, out):
             yield new
@@ -115,26 +117,27 @@ def fresh_file(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Itera
 
 
 @contextmanager
-def _beside(out: Path, overwrite: bool, inputs: Sequence[Path]) -> Iterator[Path]:
-    """A scratch folder beside `out`, whose parents are made, and removed again where nothing came to be in them."""
-    require_replaceable(out, overwrite, inputs)
+def claimed(out: Path) -> Iterator[Path]:
+    """A scratch folder beside `out`, which no other process may write while the block runs.
+
+    Its parents are made, and removed again where nothing came to be in them. **Raises** `InputError` where another
+    process writes there, and where nothing can be written.
+    """
     at = out.absolute()
-    made = [path for path in at.parents if not path.exists()]
-    try:
+    with ExitStack() as ending:
         try:
-            at.parent.mkdir(parents=True, exist_ok=True)
-            holding = scratch(at)
-            folder = holding.__enter__()
+            for path in reversed([path for path in at.parents if not path.exists()]):
+                path.mkdir()
+                ending.callback(_remove_empty, path)
+            folder = ending.enter_context(scratch(at))
         except OSError as error:
             raise InputError(str(out), f"cannot be written ({_reason(error)})", _ANOTHER) from error
-        try:
-            yield folder
-        finally:
-            holding.__exit__(None, None, None)
-    finally:
-        for path in made:
-            with suppress(OSError):
-                path.rmdir()
+        yield folder
+
+
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()
 
 
 @contextmanager

@@ -1,26 +1,31 @@
 """`jaxsub sweep`: Monte-Carlo over initial guesses, noise, vehicles and recordings."""
 
 import dataclasses
+import os
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import click
 import xarray
 
-from ..errors import InputError
+from ..errors import InputError, OutputError
+from ..estimate import require_free
+from ..findings import Finding
 from ..plain import to_json
 from ..recording import Recording
 from ..report import sweep_pictures
-from ..sweep import Plan, answered, check_folder, summarised
+from ..storage import Manifest, place
+from ..sweep import Plan, Store, answered, check_folder, require_cluster, require_memory, summarised
 from ..sweep import sweep as run_sweep
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
-from .output import require_apart, require_replaceable
+from .options import options
+from .output import claimed, require_apart, require_replaceable
 from .runs import load_runs
 
 _TOGETHER = "all"
+_RESULT, _FIGURES = "sweep.json", "figures"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,17 +48,31 @@ class Asked:
 def run(asked: Asked, out: Path, overwrite: bool) -> None:
     """Do what is missing in `out`, and write `sweep.json` and `figures/` there, beside the store.
 
-    With `overwrite` whatever is there goes, once everything else is found to be in order.
+    With `overwrite` a sweep that is there stays until the new one is done, in the folder `out`.new beside it.
     """
     session.start(long=True)
-    require_apart(out, [asked.vehicle, *asked.others, *asked.runs])
-    plan = make_plan(asked)
-    if overwrite:
-        require_replaceable(out, overwrite)
-        plan = plan.settled()
-        _remove(out)
-    else:
-        check_folder(out, plan)
+    inputs = [asked.vehicle, *asked.others, *asked.runs]
+    require_apart(out, inputs)
+    with claimed(out) as scratch:
+        anew = overwrite and out.exists()
+        if anew:
+            require_replaceable(out, True, inputs)
+        folder = out.with_name(f"{out.name}.new") if anew else out
+        plan = make_plan(asked)
+        check_folder(folder, plan)
+        _require_unchanged(folder)
+        if asked.cluster is not None:
+            require_cluster(asked.cluster)
+        summary = _swept(asked, plan, folder)
+        if anew:
+            _replace(out, folder, scratch, inputs)
+    if not options().json:
+        terminal.say(f"{summary['done']} searches in {out}")
+    terminal.count(_findings(summary))
+
+
+def _swept(asked: Asked, plan: Plan, folder: Path) -> dict[str, Any]:
+    """The summary of the sweep, shown and written to `folder`."""
     done = [0, 0]
     try:
         with terminal.counted(f"sweeping {', '.join(plan.vehicles)}") as tell:
@@ -62,39 +81,62 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
                 done[:] = count, total
                 tell(count, total)
 
-            dataset = run_sweep(plan, out, cluster=asked.cluster, progress=progress)
+            dataset = run_sweep(plan, folder, cluster=asked.cluster, progress=progress)
         with terminal.progress("summarising") as say:
             say("basins and figures")
             summary = summarised(plan, dataset)
-            _write(summary, dataset, out)
+        terminal.emit(summary, lambda: [_show(case) for case in summary["cases"]])
+        _write(summary, dataset, folder)
     except KeyboardInterrupt as stop:
-        raise click.Abort(
-            f"interrupted; {done[0]} of {done[1]} are kept in {out}, and the same command goes on"
-        ) from stop
-    for case in summary["cases"]:
-        _show(case)
-    terminal.say(f"{summary['done']} searches in {out}")
+        kept = f"{done[0]} of {done[1]} are kept in {folder}, and the same command goes on"
+        raise KeyboardInterrupt(f"interrupted; {kept if done[1] else 'nothing was computed yet'}") from stop
+    return summary
 
 
-def _remove(out: Path) -> None:
-    if out.is_dir():
-        shutil.rmtree(out)
-    else:
-        out.unlink(missing_ok=True)
+def _findings(summary: dict[str, Any]) -> list[Finding]:
+    """A warning for each case whose best estimate does not explain its runs."""
+    warning = lambda where, what: Finding("unexplained-runs", "warning", where, what)
+    titled = {f"{case['vehicle']} on {case['recording']}": case["assessment"] for case in summary["cases"]}
+    return [warning(title, told["verdict"]) for title, told in titled.items() if not told["explains"]]
+
+
+def _require_unchanged(folder: Path) -> None:
+    """Raise `InputError` where a file that the sweep would write again was changed or written by somebody else."""
+    manifest = Manifest.of_folder(folder)
+    for path in [folder / _RESULT, *(folder / _FIGURES).glob("sweep-*.png")]:
+        if os.path.lexists(path) and not manifest.lists(path):
+            what = "was not written by jaxsub or has changed since, and would be replaced"
+            raise InputError(str(path), what, "move it elsewhere or choose another --out")
+
+
+def _replace(out: Path, folder: Path, scratch: Path, inputs: Sequence[Path]) -> None:
+    """Move the new sweep to `out`, and remove the old one."""
+    try:
+        require_replaceable(out, True, inputs)
+    except InputError as error:
+        where, what, _ = error.parts
+        raise OutputError(where, what, f"the new sweep is in {folder}") from error
+    place(folder, out, scratch)
+    if folder.exists():
+        shutil.rmtree(folder)
 
 
 def make_plan(asked: Asked) -> Plan:
     """The plan that was asked for. Raises `InputError` for whatever cannot be read or does not fit."""
     vehicles = _by_stem([asked.vehicle, *asked.others], read_vehicle)
+    for path, vehicle in zip([asked.vehicle, *asked.others], vehicles.values(), strict=True):
+        require_free(vehicle, str(path))
     first = next(iter(vehicles.values()))
     recordings = load_runs(asked.runs, first)
     for other in list(vehicles.values())[1:]:
         load_runs(asked.runs, other)
     if len({recording.name for recording in recordings}) < len(recordings):
         raise InputError(", ".join(map(str, asked.runs)), "two runs have one name", "rename one of the files")
+    sets: dict[str, Sequence[Recording]] = {recording.name: [recording] for recording in recordings}
+    require_memory(vehicles, sets if asked.apart else {_TOGETHER: recordings}, asked.starts, asked.noise_seeds)
     if asked.noise_seeds:
         recordings = answered(first, recordings)
-    sets: dict[str, Sequence[Recording]] = {recording.name: [recording] for recording in recordings}
+        sets = {recording.name: [recording] for recording in recordings}
     return Plan(
         vehicles,
         sets if asked.apart else {_TOGETHER: recordings},
@@ -114,20 +156,24 @@ def _by_stem(paths: Sequence[Path], read: Any) -> Mapping[str, AbstractVehicle]:
     return named
 
 
-def _write(summary: dict, dataset: xarray.Dataset, out: Path) -> None:
-    (out / "figures").mkdir(exist_ok=True)
+def _write(summary: dict, dataset: xarray.Dataset, folder: Path) -> None:
+    store = Store(folder, summary["plan"])
     for picture in sweep_pictures(dataset, summary):
-        (out / "figures" / f"{picture.name}.png").write_bytes(picture.png)
-    (out / "sweep.json").write_text(to_json(summary), encoding="utf-8")
+        store.keep(folder / _FIGURES / f"{picture.name}.png", picture.png)
+    store.keep(folder / _RESULT, to_json(summary).encode())
 
 
 def _show(case: dict) -> None:
     rate, (low, high) = case["success"], case["success"]["interval"]
     title = f"{case['vehicle']} on {case['recording']}"
+    among = f"{case['basins_of']} searches" + (
+        " with the first seed of noise" if rate["count"] > case["basins_of"] else ""
+    )
     lines = [
+        f"{title}: the best estimate {case['assessment']['verdict']}",
         f"{title}: {rate['successes']} of {rate['count']} searches reach the least cost known"
         f" ({100 * rate['share']:.1f} %, 95 % interval {100 * low:.1f} to {100 * high:.1f} %)",
-        f"basins found: {case['basins_found']}; "
+        f"basins found: {case['basins_found']} among {among}: "
         + ", ".join(f"{basin['count']} at cost {basin['cost']:.6g}" for basin in case["basins"]),
         "outcomes: " + ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in case["outcomes"].items()),
     ]

@@ -8,13 +8,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 from scipy import stats
-from scipy.cluster import hierarchy
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from .method import Found
 from .problem import Problem
 
 # standard errors between ends of one basin
 _REACH = 1.0
+# of ends whose distances are all taken
+_PAIRS = 20_000_000
 
 
 def scattered(problem: Problem, spread: float, count: int, seed: int) -> Float[Array, "n d"]:
@@ -102,11 +106,25 @@ def basins(problem: Problem, found: Found) -> tuple[list[Basin], int]:
     curvature = np.asarray(_curvature(problem, jnp.asarray(y[order[0]])))
     values, vectors = np.linalg.eigh(curvature)
     whitened = (y[order] - y[order[0]]) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
-    label = np.ones(1, int)
-    if len(order) > 1:
-        label = hierarchy.fcluster(hierarchy.linkage(whitened, "single"), _REACH, "distance")
+    label = _connected(whitened)
     found_in = {basin: np.flatnonzero(label == basin) for basin in dict.fromkeys(label.tolist())}
     return [Basin(float(cost[order[i[0]]]), len(i), y[order[i[0]]]) for i in found_in.values()], lost
+
+
+def _connected(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
+    """A number for each point, the same where one can go from one to the other in steps of at most `_REACH`.
+
+    Where more than `_PAIRS` are that close, those that share a cell of a grid count as one point, a hundredth of
+    `_REACH` wide and as much wider as it takes.
+    """
+    tree, member, width = KDTree(points), np.arange(len(points)), 0.0
+    while tree.count_neighbors(tree, _REACH) > _PAIRS:
+        width = 2.0 * width or 0.01 * _REACH / np.sqrt(points.shape[1])
+        _, first, member = np.unique(np.floor(points / width), axis=0, return_index=True, return_inverse=True)
+        tree = KDTree(points[first])
+    pairs = tree.query_pairs(_REACH, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(tree.n, tree.n))
+    return connected_components(graph, directed=False)[1][member]
 
 
 @eqx.filter_jit

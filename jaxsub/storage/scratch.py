@@ -63,6 +63,13 @@ def scratch_folders(parent: Path) -> list[Path]:
     return [path for path in found if path.is_dir() and not path.is_symlink()]
 
 
+def clear_dead(parent: Path) -> None:
+    """Remove what dead processes of this host left in `parent`."""
+    for folder in scratch_folders(parent):
+        if is_dead(folder):
+            _clear(folder)
+
+
 def is_dead(folder: Path) -> bool:
     """Whether the process that made a scratch folder is known to have ended."""
     told = _NAME.fullmatch(folder.name)

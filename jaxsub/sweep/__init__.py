@@ -1,9 +1,11 @@
 """Sweeps: Monte-Carlo over initial guesses, noise, vehicles and recordings, on this machine or on a cluster."""
 
 from .answered import answered
+from .cluster import require_cluster
 from .dataset import open_sweep
 from .described import described
 from .execute import sweep
+from .limits import require_memory
 from .plan import Chunk, Plan
 from .run import OUTCOMES, run_chunks
 from .store import Store, check_folder
@@ -18,6 +20,8 @@ __all__ = [
     "check_folder",
     "described",
     "open_sweep",
+    "require_cluster",
+    "require_memory",
     "run_chunks",
     "succeeded",
     "summarised",

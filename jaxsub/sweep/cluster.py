@@ -28,7 +28,7 @@ from .plan import Chunk, Plan
 from .run import Answers
 
 LOCAL = "local"
-_PATIENCE = "15s"
+_PATIENCE = "5s"
 # settings of this process that every worker takes over, and those that one on the same machine can
 _SAME = ("jax_enable_x64",)
 _CACHE = (
@@ -60,6 +60,14 @@ def on_cluster(plan: Plan, chunks: Sequence[Chunk], address: str) -> Iterator[tu
         client.unregister_worker_plugin(plugin.name)
 
 
+def require_cluster(address: str) -> None:
+    """Raise `InputError` where there is no `distributed`, or no scheduler at `address`."""
+    distributed = _distributed()
+    if address != LOCAL:
+        with _client(distributed, address):
+            pass
+
+
 def _distributed() -> Any:
     try:
         import distributed
@@ -81,7 +89,7 @@ def _client(distributed: Any, address: str) -> Iterator[Any]:
     try:
         # a default client would take over whatever this program computes by Dask, and stays so where it finds nobody
         client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, LookupError, TypeError) as error:
         remedy = "give the address of a Dask scheduler, such as tcp://10.0.0.1:8786, or local"
         raise InputError(f"--cluster {address}", "no scheduler answers there", remedy) from error
     with client:

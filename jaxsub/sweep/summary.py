@@ -6,14 +6,12 @@ import jax.numpy as jnp
 import numpy as np
 import xarray
 
-from ..estimate import MARGIN, Found, Rate, basins
+from ..estimate import MARGIN, Assessment, Found, Problem, Rate, assess_residuals, basins, output_errors
 from ..estimate.method import problems
 from ..results import SUCCESSFUL
 from .plan import Plan
 from .run import OUTCOMES
 
-# ends that are sorted into basins, whose distances are all taken: the first of a case
-_SORTED = 2000
 _LISTED = 5
 
 
@@ -21,13 +19,20 @@ def summarised(plan: Plan, dataset: xarray.Dataset) -> dict[str, Any]:
     """The summary of a sweep as JSON has it; `dataset` is what `sweep` gave for `plan`.
 
     A success is a search that came within `estimate.MARGIN` of the least cost that any start found on the same
-    recordings. Basins are those of the first noise. Of coefficients it has the best start's estimate; the percentiles
+    recordings. Basins are those of the `basins_of` searches on the first noise, and `assessment` says whether the best
+    of these explains the recordings. Of coefficients it has the best start's estimate; the percentiles
     of all ends that are numbers; and, where there are seeds of noise, the standard deviation of the best estimates
     over them beside the standard error that each claims on average.
     """
     done = np.asarray(dataset.done)
     cases = [_case(plan, index, dataset.sel(vehicle=v, recording=r)) for index, (v, r) in enumerate(plan.cases)]
-    return {"schema": 1, "searches": int(done.size), "done": int(done.sum()), "cases": cases}
+    return {
+        "schema": 1,
+        "plan": dataset.attrs["plan"],
+        "searches": int(done.size),
+        "done": int(done.sum()),
+        "cases": cases,
+    }
 
 
 def best_starts(case: xarray.Dataset) -> np.ndarray:
@@ -58,8 +63,10 @@ def _case(plan: Plan, index: int, case: xarray.Dataset) -> dict[str, Any]:
         "recording": recorded,
         "outcomes": {name: int(count) for name, count in zip(OUTCOMES, counts, strict=True) if count},
         "success": Rate(int(good.sum()), int(good.size)).to_json(),
+        "assessment": _assessed(plan, index, case, int(best[0])).to_json(),
         "margin": MARGIN,
         "least_cost": _number(_costs(case)[0, best[0]]),
+        "basins_of": plan.starts,
         "basins_found": len(found),
         "basins": [{"cost": basin.cost, "count": basin.count} for basin in found[:_LISTED]],
         "without_an_end": lost,
@@ -69,12 +76,27 @@ def _case(plan: Plan, index: int, case: xarray.Dataset) -> dict[str, Any]:
 
 
 def _basins(plan: Plan, index: int, case: xarray.Dataset) -> tuple[list, int]:
-    problem, count = plan.problems[index], min(plan.starts, _SORTED)
-    first = case.isel(noise=0, start=slice(count))
+    problem, first = plan.problems[index], case.isel(noise=0)
     y = np.asarray(first.coordinates)[:, : len(problem.coordinates())]
     cost, evaluations = (jnp.asarray(np.asarray(values)) for values in (first.cost, first.evaluations))
-    own = problems(problem, plan.outputs(index, np.arange(1)))(jnp.asarray(0))
-    return basins(own, Found(jnp.asarray(y), cost, evaluations, SUCCESSFUL))
+    return basins(_first_noise(plan, index), Found(jnp.asarray(y), cost, evaluations, SUCCESSFUL))
+
+
+def _first_noise(plan: Plan, index: int) -> Problem:
+    """The problem of a case with the recordings of the first noise."""
+    return problems(plan.problems[index], plan.outputs(index, np.arange(1)))(jnp.asarray(0))
+
+
+def _assessed(plan: Plan, index: int, case: xarray.Dataset, best: int) -> Assessment:
+    """Whether the estimate from the start `best` explains the recordings of the first noise."""
+    problem, layout = _first_noise(plan, index), plan.problems[index].vehicle.layout
+    y = np.asarray(case.coordinates)[0, best][: len(problem.coordinates())]
+    mask, known = np.asarray(problem.runs.mask), [output.sigma is not None for output in layout.outputs]
+    residual = np.full(mask.shape, np.nan)
+    if np.isfinite(y).all():
+        vehicle, start = problem.split(jnp.asarray(y))
+        residual = np.asarray(output_errors(vehicle, problem.runs, start) / problem.sigma)
+    return assess_residuals(layout.channels, residual, mask, len(y), known)
 
 
 def _coefficients(rows: list, case: xarray.Dataset, best: np.ndarray) -> dict[str, Any]:

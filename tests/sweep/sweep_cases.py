@@ -60,3 +60,8 @@ def farthest(one, other):
     for name in EXACT:
         np.testing.assert_array_equal(np.isnan(one[name].values), np.isnan(other[name].values))
     return max(float(np.nanmax(np.abs(one[name].values - other[name].values))) / size(name) for name in EXACT)
+
+
+def tree(folder):
+    """The files below `folder` and their contents."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}

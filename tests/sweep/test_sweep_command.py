@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 from PIL import Image
-from sweep_cases import environment, farthest, files
+from sweep_cases import environment, farthest, files, tree
 
 from jaxsub.cli import main
 from jaxsub.sweep import open_sweep
@@ -28,7 +28,8 @@ def command(monkeypatch, capsys, *arguments):
         code = 0
     except SystemExit as stop:
         code = stop.code
-    return code, capsys.readouterr().err
+    said = capsys.readouterr()
+    return code, said.err + said.out
 
 
 def kept(folder):
@@ -70,7 +71,8 @@ def test_a_killed_sweep_does_only_what_is_missing(resumed, monkeypatch, capsys):
     whole = [*arguments[:-1], str(folder / "whole")]
     assert command(monkeypatch, capsys, *whole, *OPTIONS)[0] == 0
     assert farthest(open_sweep(folder / "whole"), open_sweep(folder / "out")) <= 1e-9
-    assert not list((folder / "out").rglob(".*"))
+    assert [path.name for path in (folder / "out").rglob(".*")] == [".jaxsub.jsonl"]
+    assert not list(folder.glob(".jaxsub-*"))
 
 
 def test_it_writes_and_says_what_it_found(resumed, monkeypatch, capsys):
@@ -103,15 +105,97 @@ def test_another_plan_is_refused_and_the_folder_left_alone(resumed, monkeypatch,
     assert {path: path.stat().st_mtime_ns for path in (folder / "out").rglob("*")} == before
 
 
-def test_a_folder_that_is_no_sweep_is_refused_unless_it_may_go(tmp_path, monkeypatch, capsys):
+def test_a_folder_that_is_no_sweep_is_refused_with_and_without_overwrite(tmp_path, monkeypatch, capsys):
     arguments = files(tmp_path)
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("keep", encoding="utf-8")
+    before = tree(tmp_path)
     code, said = command(monkeypatch, capsys, *arguments, "--starts", "3")
     assert code == 2 and said.count("\n") == 1 and "plan.json" in said
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine.txt"]
-    assert command(monkeypatch, capsys, *arguments, "--starts", "3", "--overwrite")[0] == 0
-    assert not (tmp_path / "out" / "mine.txt").exists()
+    code, said = command(monkeypatch, capsys, *arguments, "--starts", "3", "--overwrite")
+    assert code == 2 and said.count("\n") == 1 and "not written by jaxsub" in said
+    assert tree(tmp_path) == before
+
+
+def test_overwrite_keeps_the_old_sweep_until_the_new_one_is_done(tmp_path, monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+        yield
+
+    arguments = files(tmp_path)
+    assert command(monkeypatch, capsys, *arguments, "--starts", "3")[0] == 0
+    before = tree(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr("jaxsub.sweep.execute.on_this_machine", stopped)
+        _, said = command(patch, capsys, *arguments, "--starts", "4", "--overwrite")
+    assert f"0 of 4 are kept in {tmp_path / 'out'}.new" in said
+    assert before.items() <= tree(tmp_path).items()
+    code, said = command(monkeypatch, capsys, *arguments, "--starts", "4", "--overwrite")
+    assert code == 0 and open_sweep(tmp_path / "out").sizes["start"] == 4
+    assert not (tmp_path / "out.new").exists() and not list(tmp_path.glob(".jaxsub-*"))
+    (tmp_path / "out" / "sweep.json").write_text("mine", encoding="utf-8")
+    for options in ((), ("--overwrite",)):
+        code, said = command(monkeypatch, capsys, *arguments, "--starts", "4", *options)
+        assert code == 2 and "sweep.json" in said and "changed since" in said
+    assert (tmp_path / "out" / "sweep.json").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("damage", [b"", b"{", b'{"plan": 3, "layout": {}}'])
+def test_damaged_plan_is_made_anew_by_its_command_and_by_no_other(tmp_path, monkeypatch, capsys, damage):
+    arguments = files(tmp_path)
+    assert command(monkeypatch, capsys, *arguments, "--starts", "3")[0] == 0
+    before, cells = tree(tmp_path), kept(tmp_path / "out")
+    (tmp_path / "out" / "plan.json").write_bytes(damage)
+    damaged = tree(tmp_path)
+    code, said = command(monkeypatch, capsys, *arguments, "--starts", "4")
+    assert code == 2 and said.count("\n") == 1 and "give the command that began it" in said
+    assert tree(tmp_path) == damaged
+    assert command(monkeypatch, capsys, *arguments, "--starts", "3")[0] == 0
+    after = tree(tmp_path)
+    del before["out/.jaxsub.jsonl"], after["out/.jaxsub.jsonl"]
+    assert after == before and kept(tmp_path / "out") == cells
+
+
+EARLY = {
+    "10¹² starts": (["--starts", str(10**12)], "of memory"),
+    "2³¹ seeds": (["--starts", "3", "--noise-seeds", str(2**31)], "of memory"),
+    "no scheduler": (["--starts", "3", "--cluster", "tcp://127.0.0.1:9"], "no scheduler answers"),
+    "no address": (["--starts", "3", "--cluster", "foo://nowhere"], "no scheduler answers"),
+    "a word": (["--starts", "3", "--cluster", "there"], "no scheduler answers"),
+}
+
+
+@pytest.mark.parametrize("name", EARLY)
+def test_what_cannot_be_is_said_in_one_line_before_anything_is_written(tmp_path, monkeypatch, capsys, name):
+    options, word = EARLY[name]
+    arguments = files(tmp_path)
+    before = tree(tmp_path)
+    code, said = command(monkeypatch, capsys, *arguments, *options)
+    assert code == 2 and said.count("\n") == 1 and word in said, said
+    assert tree(tmp_path) == before
+
+
+def test_sweep_without_free_coefficients_or_dask_is_refused(tmp_path, monkeypatch, capsys):
+    arguments = files(tmp_path)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    code, said = command(monkeypatch, capsys, *arguments, "--starts", "3", "--cluster", "local")
+    assert code == 2 and "pip install 'jaxsub[cluster]'" in said
+    text = (tmp_path / "vehicle.toml").read_text(encoding="utf-8")
+    (tmp_path / "vehicle.toml").write_text(text.replace("}", ", fixed = true}"), encoding="utf-8")
+    code, said = command(monkeypatch, capsys, *arguments, "--starts", "3")
+    assert code == 2 and "all coefficients are fixed" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_model_that_does_not_explain_its_runs_is_no_success(tmp_path, monkeypatch, capsys):
+    arguments = files(tmp_path)
+    text = (tmp_path / "vehicle.toml").read_text(encoding="utf-8")
+    (tmp_path / "vehicle.toml").write_text(text.replace("sigma = 0.01", "sigma = 0.001"), encoding="utf-8")
+    code, said = command(monkeypatch, capsys, *arguments, "--starts", "3", "--strict")
+    assert code == 3 and "the best estimate does not explain these runs: x " in said
+    told = json.loads((tmp_path / "out" / "sweep.json").read_text(encoding="utf-8"))["cases"][0]
+    assert not told["assessment"]["explains"]
+    assert sum(basin["count"] for basin in told["basins"]) + told["without_an_end"] == told["basins_of"] == 3
 
 
 def test_axes_of_the_command_line(tmp_path, monkeypatch, capsys):
@@ -137,6 +221,6 @@ def test_an_interrupt_says_what_is_kept(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr("jaxsub.sweep.execute.on_this_machine", stopped)
     code, said = command(monkeypatch, capsys, *files(tmp_path), "--starts", "3")
-    assert code == 1
+    assert code in (1, 130)
     assert f"0 of 3 are kept in {tmp_path / 'out'}" in said.splitlines()[-1]
     assert os.path.exists(tmp_path / "out" / "plan.json")
