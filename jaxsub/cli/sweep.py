@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import click
 import xarray
 
 from ..errors import InputError, OutputError
@@ -89,7 +90,7 @@ def _swept(asked: Asked, plan: Plan, folder: Path) -> dict[str, Any]:
         _write(summary, dataset, folder)
     except KeyboardInterrupt as stop:
         kept = f"{done[0]} of {done[1]} are kept in {folder}, and the same command goes on"
-        raise KeyboardInterrupt(f"interrupted; {kept if done[1] else 'nothing was computed yet'}") from stop
+        raise click.Abort(f"interrupted; {kept if done[1] else 'nothing was computed yet'}") from stop
     return summary
 
 
