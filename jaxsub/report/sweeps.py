@@ -1,7 +1,6 @@
 """The figure of a sweep: how high the searches ended, and where."""
 
 import math
-import re
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from ..sweep import succeeded
 from .drawing import BASELINE, GREY, IMPROVED, PALE, Picture, drawable, new_figure, plain_ticks, png, style
-from .text import percent, power_of_ten
+from .text import file_stem, percent, power_of_ten
 
 _LOWEST = 1e-6  # rises of cost below it are rounding
 _MOST_COEFFICIENTS, _MOST_POINTS, _REACH = 14, 400, 2.0
@@ -39,7 +38,7 @@ def _draw(case: xarray.Dataset, told: dict[str, Any]) -> Picture:
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     title = f"{told['vehicle']} on {told['recording']}"
     figure.suptitle(drawable(title, 80), x=0.01, ha="left", fontsize=10)
-    name = re.sub(r"[^\w.-]", "_", f"sweep-{told['vehicle']}-{told['recording']}")
+    name = file_stem(f"sweep-{told['vehicle']}-{told['recording']}")
     alt = f"How far above the least cost {told['success']['count']} searches ended, and at which coefficients"
     return Picture(name, alt, png(figure))
 

@@ -1,5 +1,6 @@
 """Numbers, symbols and formulas as a person would write them."""
 
+import hashlib
 import math
 import re
 import unicodedata
@@ -16,6 +17,7 @@ _GREEK: dict[str, str] = {
     "kappa": "κ", "rho": "ρ", "omega": "ω",
 }  # fmt: skip
 _PLAIN_EXPONENTS = range(-4, 6)  # powers of ten that are written out
+_LONGEST_STEM = 100  # file systems take 255 bytes
 _SMALLEST_P = 1e-300  # below it a p-value is no longer a number that was computed
 
 
@@ -88,6 +90,12 @@ def visible(value: Any) -> Any:
         return value
     shown = "".join(letter if _shows(letter) else f"[U+{ord(letter):04X}]" for letter in value)
     return Markup(shown) if isinstance(value, Markup) else shown
+
+
+def file_stem(name: str) -> str:
+    """A file name without suffix for what is called `name`: plain letters, short, and another for another name."""
+    plain = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:_LONGEST_STEM]
+    return plain if plain == name else f"{plain}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 def symbol(name: str) -> str:

@@ -1,0 +1,66 @@
+"""The answer of a diagnosis on the terminal and in its folder: one content, valid JSON, whole names and numbers."""
+
+import dataclasses
+import json
+import math
+
+import click
+import pytest
+from report_examples import bare, diagnosis
+
+from jaxsub.cli.diagnose import Answer
+from jaxsub.cli.options import Options
+from jaxsub.discrepancy.diagnosis import Explained
+from jaxsub.report.text import file_stem
+from jaxsub.vehicle.catalogue import dsrv
+
+
+def shown(capsys, made, **options):
+    with click.Context(click.Command("diagnose"), obj=Options(**options)):
+        Answer(made, dsrv(), None).emit()
+    return capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verdict", ["none", "named", "ambiguous", "unknown"])
+def test_json_is_the_file_and_nothing_else(verdict, capsys, tmp_path):
+    """Claim: with numbers that are not finite too, standard output is one valid JSON text, that of the file."""
+    made = diagnosis(verdict, samples=40)
+    lost = {
+        part: {m: rms | {"v": math.inf, "z": math.nan} for m, rms in both.items()} for part, both in made.fit.items()
+    }
+    made = dataclasses.replace(made, p_value=math.nan, fit=lost, explained=Explained(None, {}, False, False))
+    content = json.loads(shown(capsys, made, json=True), parse_constant=pytest.fail)
+    assert content["verdict"] == verdict and content["mismatch"]["p_value"] is None
+    assert content["fit"]["held_out"]["baseline"]["v"] is None and content["explained"] is None
+    assert [one["check"] for one in content["warnings"]] == ["sentinel", "header-row"]
+    if verdict == "none":
+        Answer(made, dsrv(), None).write(tmp_path)
+        assert json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8")) == content
+        assert {path.name for path in tmp_path.iterdir()} == {
+            "diagnosis.json",
+            "improved.toml",
+            "report.html",
+            "figures",
+        }
+
+
+def test_the_terminal_has_the_verdict_the_effect_and_the_errors_whole(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    made = diagnosis("named", samples=40)
+    long = {"a_channel_with_a_name_that_no_terminal_of_40_columns_holds": 1234.5}
+    fit = {"held_out": {"baseline": long, "improved": dict.fromkeys(long, 1.02)}}
+    said = shown(capsys, dataclasses.replace(made, fit=fit))
+    assert "named" in said and "crossflow-drag[horizontal]" in said and "0.614 ± 0.021" in said
+    assert next(iter(long)) in said and "1230" in said and "1.02" in said
+
+
+def test_the_least_diagnosis_is_shown(capsys):
+    assert "none" in shown(capsys, bare())
+
+
+def test_a_figures_file_has_a_plain_short_name_of_its_own():
+    assert file_stem("sweep-NPS_II-run.1") == "sweep-NPS_II-run.1"
+    names = ["../../etc/passwd", "..\\..\\etc\\passwd", "a" * 400, "a" * 401, "深さ", "深い", "nul\0", "a b", "a_b"]
+    stems = [file_stem(name) for name in names]
+    assert len(set(stems)) == len(names) and max(map(len, stems)) < 128
+    assert all("/" not in stem and "\\" not in stem and stem.isascii() and stem.isprintable() for stem in stems)
