@@ -14,7 +14,7 @@ def require_plausible(source: str, claimed: int, size: int) -> None:
     if claimed > max(_ALWAYS, _EXPANSION * size):
         what = f"claims {_bytes(claimed)} of samples in {_bytes(size)}, above {_EXPANSION} times its size"
         raise InputError(source, what, "check that it is whole, or write it anew")
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else claimed
     if claimed > memory:
         what = f"holds {_bytes(claimed)} of samples, above the {_bytes(memory)} of memory of this machine"
         raise InputError(source, what, "divide the file, or leave columns out")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
@@ -22,8 +22,8 @@ def read_netcdf(path: Path, source: str) -> Contents:
     with reading(source, "NetCDF"):
         engine = _checked(path, source)
         # xarray's own masking would not count, and does not know valid_min
-        settings = {"decode_cf": False, "engine": engine} | ({"mmap": False} if engine == "scipy" else {})
-        with xarray.open_dataset(path, **settings) as file:
+        settings: dict[str, Any] = {"mmap": False} if engine == "scipy" else {}
+        with xarray.open_dataset(path, decode_cf=False, engine=engine, **settings) as file:
             along = next((v.dims for name, v in file.variables.items() if _is_time(name)), None)
             kept, findings = {}, []
             for name, variable in file.variables.items():
@@ -39,7 +39,7 @@ def read_netcdf(path: Path, source: str) -> Contents:
     return Contents(table, tuple(findings))
 
 
-def _checked(path: Path, source: str) -> str:
+def _checked(path: Path, source: str) -> Literal["scipy", "h5netcdf"]:
     """The name of the engine that reads the file, once what its headers claim has been found to be plausible."""
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -49,7 +49,7 @@ def _checked(path: Path, source: str) -> str:
         # h5netcdf complains on stderr as well if it fails on this attribute, so look at it first
         file.attrs.get("_nc3_strict")
         columns = [item for item in file.values() if isinstance(item, h5py.Dataset) and item.ndim == 1]
-        require_plausible(source, sum(item.size * max(item.dtype.itemsize, 8) for item in columns), size)
+        require_plausible(source, sum(len(item) * max(item.dtype.itemsize, 8) for item in columns), size)
     return "h5netcdf"
 
 

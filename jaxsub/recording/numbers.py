@@ -137,7 +137,8 @@ def instant(cell: Cell) -> tuple[int, bool] | None:
         return None
     *parts, fraction, zone = found.groups()
     try:
-        moment = datetime.datetime(*(int(part or 0) for part in parts))
+        year, month, day, hour, minute, second = (int(part or 0) for part in parts)
+        moment = datetime.datetime(year, month, day, hour, minute, second)
     except ValueError:
         return None
     seconds = (moment - _EPOCH) // datetime.timedelta(seconds=1)

@@ -2,7 +2,7 @@
 
 import csv
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,9 +36,12 @@ def quick_columns(path: Path, dialect: Dialect, layout: Layout) -> list[Column] 
 
     A column that holds no numbers in the first rows is not read at all.
     """
-    known = tabulate(dialect.rows[layout.first_row - dialect.top :], "", layout, strict=False)
-    if not dialect.lines or not layout.decimal or known is None:
+    if not dialect.lines or not layout.decimal:
         return None
+    try:
+        known = tabulate(dialect.rows[layout.first_row - dialect.top :], "", layout)
+    except InputError:
+        return None  # to be named by the careful reader
     wanted = {i: layout.empty(known[i]) for i in range(len(known)) if known[i].header and known[i].error is None}
     names = [str(index) for index in range(layout.cells)]
     types = {names[i]: pyarrow.string() if isinstance(c, Instants) else pyarrow.float64() for i, c in wanted.items()}
@@ -84,28 +87,21 @@ def careful_columns(path: Path, source: str, dialect: Dialect, layout: Layout) -
     with path.open(encoding=dialect.encoding, newline="") as file:
         lines = itertools.islice(file, dialect.top - 1, None)
         rows = csv.reader(lines, delimiter=dialect.separator, skipinitialspace=True)
-        found = tabulate(itertools.islice(rows, layout.first_row - dialect.top, None), source, layout)
-    assert found is not None
-    return found
+        return tabulate(itertools.islice(rows, layout.first_row - dialect.top, None), source, layout)
 
 
-def tabulate(rows: Iterable[list[Cell]], source: str, layout: Layout, *, strict: bool = True) -> list[Column] | None:
+def tabulate(rows: Iterable[Sequence[Cell]], source: str, layout: Layout) -> list[Column]:
     """The columns of rows of cells; blank rows and comments may follow the last one.
 
-    A bad row is an InputError, or with `strict` False gives nothing.
+    Raises InputError for a row that has not a cell for each header.
     """
     columns = layout.columns()
     row = layout.first_row
-    try:
-        for chunk in _chunks(_samples(rows, source, layout), _CHUNK):
-            for column, cells in zip(columns, zip(*chunk, strict=True), strict=False):
-                if column.header:
-                    column.add(cells, row)
-            row += len(chunk)
-    except InputError:
-        if strict:
-            raise
-        return None
+    for chunk in _chunks(_samples(rows, source, layout), _CHUNK):
+        for column, cells in zip(columns, zip(*chunk, strict=True), strict=False):
+            if column.header:
+                column.add(cells, row)
+        row += len(chunk)
     return columns
 
 
@@ -124,7 +120,7 @@ def contents(source: str, columns: list[Column], layout: Layout, said: Iterable[
     return Contents(table, tuple(notes), layout.first_row)
 
 
-def _samples(rows: Iterable[list[Cell]], source: str, layout: Layout) -> Iterator[list[Cell]]:
+def _samples(rows: Iterable[Sequence[Cell]], source: str, layout: Layout) -> Iterator[Sequence[Cell]]:
     """The rows that are samples. Raises InputError for one that is none, unless only such follow."""
     skipped, width = None, len(layout.headers)
     for row, cells in enumerate(rows, layout.first_row):
@@ -138,7 +134,7 @@ def _samples(rows: Iterable[list[Cell]], source: str, layout: Layout) -> Iterato
         yield cells
 
 
-def _chunks(rows: Iterator[list[Cell]], size: int) -> Iterator[list[list[Cell]]]:
+def _chunks(rows: Iterator[Sequence[Cell]], size: int) -> Iterator[list[Sequence[Cell]]]:
     while chunk := list(itertools.islice(rows, size)):
         yield chunk
 

@@ -39,7 +39,7 @@ def read_workbook(path: Path, source: str) -> Contents:
         top = _top(rows)
         layout = find_layout(rows[top : top + _SAMPLE], top + 1)
         columns = tabulate(iter(rows[layout.first_row - 1 :]), source, layout)
-    return contents(source, columns or [], layout, said)
+    return contents(source, columns, layout, said)
 
 
 def _check(path: Path, source: str) -> None:

@@ -58,5 +58,5 @@ def test_map_of_a_guide_is_understood(tmp_path):
     assert "map.toml" in written(guide, tmp_path)
     chosen = read_selection(tmp_path / "map.toml")
     assert chosen.every == 0.02
-    assert chosen.term("delta_r[deg]") == (25.0, "", "actuator_servos.control[1]")
-    assert chosen.term("psi") == (1.0, "yaw", "vehicle_attitude.q")
+    assert chosen.term("delta_r[deg]") == (25.0, "", "actuator_servos.control[1]", 0.0)
+    assert chosen.term("psi") == (1.0, "yaw", "vehicle_attitude.q", 0.0)

@@ -66,11 +66,11 @@ class DataFlash(Log):
     @contextlib.contextmanager
     def _file(self) -> Iterator[Any]:
         self._check()
-        kind = self._package.DFReader_binary
-        file = kind.__new__(kind)  # to be closed also where its making fails
+        kind: Any = self._package.DFReader_binary
+        file: Any = kind.__new__(kind)  # to be closed also where its making fails
         with _silence():
             try:
-                file.__init__(str(self._path))
+                kind.__init__(file, str(self._path))
                 yield file
             finally:
                 if "filehandle" in vars(file):
