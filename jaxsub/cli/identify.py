@@ -51,7 +51,7 @@ def run(
         if drawn and identified.complete:
             with terminal.progress(f"identifying {vehicle.layout.name}") as told:
                 told("drawing from the posterior")
-                (folder / "posterior.nc").write_bytes(posterior(found).to_netcdf(engine="h5netcdf"))
+                (folder / "posterior.nc").write_bytes(bytes(posterior(found).to_netcdf(engine="h5netcdf")))
     if not identified.complete:
         terminal.console.print(f"jaxsub: interrupted after the fit; {out} holds the fit and what followed it so far")
         sys.exit(_INTERRUPTED)

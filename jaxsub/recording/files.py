@@ -128,7 +128,7 @@ def _write_parquet(path: Path, recording: Recording, units: Units) -> None:
 
 def _write_netcdf(path: Path, recording: Recording, units: Units) -> None:
     # through memory: HDF5 prints its own errors where a disk is full
-    path.write_bytes(to_xarray(recording, units).to_netcdf(engine="h5netcdf"))
+    path.write_bytes(bytes(to_xarray(recording, units).to_netcdf(engine="h5netcdf")))
 
 
 ARCHIVE = ".zip"
