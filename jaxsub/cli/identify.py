@@ -1,8 +1,10 @@
 """`jaxsub identify`: coefficients with standard errors, whether they explain the runs, and what the runs leave open."""
 
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -51,10 +53,17 @@ def run(
         if drawn and identified.complete:
             with terminal.progress(f"identifying {vehicle.layout.name}") as told:
                 told("drawing from the posterior")
-                (folder / "posterior.nc").write_bytes(bytes(posterior(found).to_netcdf(engine="h5netcdf")))
+                _write_posterior(posterior(found), folder / "posterior.nc")
     if not identified.complete:
         terminal.console.print(f"jaxsub: interrupted after the fit; {out} holds the fit and what followed it so far")
         sys.exit(_INTERRUPTED)
+
+
+def _write_posterior(drawn: Any, path: Path) -> None:
+    """Write draws as NetCDF, by way of another folder: where the results' disk is full HDF5 prints its own errors."""
+    with tempfile.TemporaryDirectory() as folder:
+        drawn.to_netcdf(str(Path(folder) / path.name), engine="h5netcdf")
+        path.write_bytes((Path(folder) / path.name).read_bytes())
 
 
 def _fitted(vehicle: AbstractVehicle, runs: Runs, method: str, where: str) -> Fit:
