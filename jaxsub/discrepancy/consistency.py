@@ -57,10 +57,11 @@ def assessed(
     return assess_residuals(channels, np.where(mask, whitened, 0.0), mask)
 
 
-def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder]) -> Judged:
+def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder], assessment: Assessment) -> Judged:
     """The verdict, unless it is `none` and the test runs' error is far above the noise: then `unknown`, and why.
 
-    `remains` is what the last model leaves of each channel there.
+    `remains` is what the last model leaves of each channel there and `assessment` the tests of it, of which the one of
+    size then has the mismatch's p-value.
     """
     far = {channel: rms for channel, rms in found.left.items() if remains[channel].low > FAR}
     if judged.verdict != "none" or (found.improved_runs and not far):
@@ -68,7 +69,8 @@ def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder
     large = f"Simulation error on the test runs is {sigmas(far)}"
     why = large if found.improved_runs else "The model diverges on the test runs"
     note = f"{why}, although no missing effect is significant: the verdict is unknown and not none."
-    return dataclasses.replace(judged, verdict="unknown", notes=[*judged.notes, note])
+    p_value = judged.p_value if assessment.size is None else min(judged.p_value, assessment.size)
+    return dataclasses.replace(judged, verdict="unknown", p_value=p_value, notes=[*judged.notes, note])
 
 
 def sigmas(rms: Mapping[str, float]) -> str:

@@ -100,7 +100,7 @@ def _told(
     channels = channel_quality(improved)
     assessment = assessed(after.error, held, layout.channels, sigma)
     found = compared(before.rms, after.rms, remains["baseline"], channels, assessment)
-    judged = consistent(judged, found, remains[models[-1][0]])
+    judged = consistent(judged, found, remains[models[-1][0]], assessment)
     where = _where(judged, first, field, train)
     own = improved if named is best else allowing_for(named.view, named.fit)
     physics = [_physics(one, own) for one in judged.named]

@@ -49,18 +49,18 @@ def remainder(low):
 def explained(before, after, noise=None):
     was, left, _ = simulated(*before)
     now, remains, assessment = simulated(*after, seed=1)
-    return compared(was, now, left, noise or quality(), assessment), remains
+    return compared(was, now, left, noise or quality(), assessment), remains, assessment
 
 
 @quick
 @given(v=sizes, psi=sizes, p_value=st.floats(0.0, 1.0))
 def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
     """Claim: with any channel's interval above 2 σ the verdict is unknown, with the reason; else it is left alone."""
-    found, remains = explained((v, psi), (v, psi))
-    judged = consistent(Judged("none", [], p_value, ["said"]), found, remains)
+    found, remains, assessment = explained((v, psi), (v, psi))
+    judged = consistent(Judged("none", [], p_value, ["said"]), found, remains, assessment)
     far = [c for c in CHANNELS if remains[c].low > FAR]
     assert judged.verdict == ("unknown" if far else "none")
-    assert judged.notes[0] == "said" and judged.p_value == p_value
+    assert judged.notes[0] == "said" and judged.p_value == (min(p_value, assessment.size) if far else p_value)
     assert all(f"σ in {channel}" in judged.notes[-1] for channel in far)
     said = summary("none", [], [], [], found, p_value)
     large = [one for one in CHANNELS if one in found.left]
@@ -70,9 +70,9 @@ def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
 
 @pytest.mark.parametrize("verdict", ["named", "ambiguous", "unknown"])
 def test_other_verdicts_are_left_alone(verdict):
-    found, remains = explained((9.0, 9.0), (9.0, 9.0))
+    found, remains, assessment = explained((9.0, 9.0), (9.0, 9.0))
     judged = Judged(verdict, [], 1e-9, [])
-    assert consistent(judged, found, remains) is judged
+    assert consistent(judged, found, remains, assessment) is judged
 
 
 def test_a_model_that_diverges_on_the_test_run_is_not_none():
@@ -82,7 +82,7 @@ def test_a_model_that_diverges_on_the_test_run_is_not_none():
     lost = dict.fromkeys(CHANNELS, math.nan)
     found = compared(lost, lost, {c: remainder(math.nan) for c in CHANNELS}, quality(), wild)
     assert found == Explained(None, {}, False, False)
-    judged = consistent(Judged("none", [], 1.0, []), found, {c: remainder(math.nan) for c in CHANNELS})
+    judged = consistent(Judged("none", [], 1.0, []), found, {c: remainder(math.nan) for c in CHANNELS}, wild)
     assert judged.verdict == "unknown" and "diverges" in judged.notes[-1]
     assert "diverges" in summary("unknown", [], [], [], found, 1.0)
 
@@ -91,7 +91,7 @@ def test_a_model_that_diverges_on_the_test_run_is_not_none():
 @given(before=st.tuples(sizes, sizes), after=st.tuples(sizes, sizes))
 def test_the_share_is_that_of_the_excess_variance(before, after):
     """Claim: 1 − Σ(rms²−1 after)/Σ(rms²−1 before), above zero where the error falls, None without excess."""
-    found, _ = explained(before, after)
+    found, _, _ = explained(before, after)
     was, left, _ = simulated(*before)
     now, _, _ = simulated(*after, seed=1)
     excess = [sum(max(value**2 - 1.0, 0.0) for value in rms.values()) for rms in (was, now)]
@@ -105,9 +105,9 @@ def test_the_share_is_that_of_the_excess_variance(before, after):
 
 def test_noise_that_nobody_stated_is_the_white_part_of_the_recording():
     """Claim: where σ is all that the baseline leaves, what falls below it to the white part counts as explained."""
-    unstated, _ = explained((1.0, 1.0), (0.5, 0.5), quality(estimated=True, white=0.5))
+    unstated, _, _ = explained((1.0, 1.0), (0.5, 0.5), quality(estimated=True, white=0.5))
     assert unstated.share > 0.9
-    stated, _ = explained((1.0, 1.0), (0.5, 0.5))
+    stated, _, _ = explained((1.0, 1.0), (0.5, 0.5))
     assert stated.share is None
 
 

@@ -117,6 +117,17 @@ def test_a_slow_random_force_is_no_effect(lengths):
 
 
 @pytest.mark.long
+def test_random_forces_far_above_the_noise_are_not_none():
+    """Claim: where the test run's error is 25 σ the verdict is unknown with its p-value, though no effect is named."""
+    runs = disturbed(3.0, (40.0, 120.0), 1)
+    found, _ = diagnose(wrong(), runs[:2], runs[2:], vocabulary=SMALL)
+    assert (found.verdict, found.physics) == ("unknown", [])
+    assert found.p_value < 1e-6 and max(found.explained.left.values()) > 10.0
+    assert "Simulation error on the test run" in found.summary
+    assert any("unknown and not none" in note for note in found.notes)
+
+
+@pytest.mark.long
 def test_near_twins_are_ambiguous_with_their_rivals():
     """Claim: an asymmetry hardly told from its twins has them as rivals, and the next run is planned to part them.
 
