@@ -17,7 +17,7 @@ STARTS = ("rest", "recorded", "estimated")
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
 _columns = click.option("--columns", type=_PATH, help="A TOML file that says which channels of a log to take.")
-_overwrite = click.option("--overwrite", is_flag=True, help="Replace what is at --out.")
+_overwrite = click.option("--overwrite", is_flag=True, help="Replace what jaxsub wrote at --out before.")
 
 
 def _out(**settings: object) -> Callable:

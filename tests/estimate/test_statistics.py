@@ -5,10 +5,12 @@ import logging
 
 import jax
 import numpy as np
+import pytest
 from rigs import driven, oscillator, recorded, stacked
 from scipy.stats import chi2
 
 from jaxsub.estimate import fit
+from jaxsub.estimate.starts import _connected
 from jaxsub.results import RESULTS
 from jaxsub.simulate import synthetic
 
@@ -58,3 +60,15 @@ def test_a_second_recording_of_the_same_shape_compiles_nothing(caplog):
 
     assert compiled(40) == []
     assert compiled(41) != []
+
+
+@pytest.mark.parametrize("pairs", [10**9, 2000])
+def test_ends_are_clustered_alike_with_and_without_a_grid(monkeypatch, pairs):
+    monkeypatch.setattr("jaxsub.estimate.starts._PAIRS", pairs)
+    rng = np.random.default_rng(0)
+    chain = np.column_stack([0.5 * np.arange(60), np.zeros(60), np.zeros(60)])
+    balls = [centre + 0.05 * rng.normal(size=(400, 3)) for centre in ([100.0, 0, 0], [0, 100.0, 0])]
+    points = np.concatenate([chain, *balls, [[300.0, 0, 0]]])
+    label = _connected(points)
+    assert [len(set(label[:60])), len(set(label[60:460])), len(set(label[460:860]))] == [1, 1, 1]
+    assert len(set(label)) == 4

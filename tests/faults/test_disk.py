@@ -108,6 +108,14 @@ def test_command_on_a_full_disk_shows_its_verdict_and_names_the_path(disk, rig, 
     assert tree(disk) == before
 
 
+def test_sweep_on_a_full_disk_names_the_path_and_keeps_what_is_done(disk, rig, monkeypatch, capfd):
+    filled(disk)
+    code, said = ran(monkeypatch, capfd, "sweep", *rig, "--starts", "3", "--out", disk / "out")
+    assert code == 1 and f"{disk / 'out'}" in said.err.strip().splitlines()[-1]
+    assert "cannot be written" in said.err and "HDF5" not in said.err
+    assert not list(disk.rglob(".jaxsub-*"))
+
+
 @pytest.mark.parametrize(("command", "out"), [("identify", "out"), ("simulate", "out.nc"), ("sweep", "out")])
 def test_command_on_a_disk_that_is_read_only_is_refused_before_the_work(disk, rig, monkeypatch, capfd, command, out):
     (disk / "mine").write_text("mine")
