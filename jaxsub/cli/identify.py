@@ -15,6 +15,7 @@ from ..identifiability import coloured_covariance, identifiability
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
+from .effort import Effort
 from .identification import Identification
 from .output import fresh_folder, paths_of
 from .runs import load_runs
@@ -42,10 +43,15 @@ def run(
         vehicle = read_vehicle(vehicle_path)
         require_free(vehicle, str(vehicle_path))
         recordings = load_runs(runs, vehicle, columns)
+        stacked = batch(vehicle, recordings)
+        del recordings
+        effort = Effort(vehicle, stacked)
+        if announcement := effort.announcement():
+            terminal.note(announcement)
         with terminal.progress(f"identifying {vehicle.layout.name}") as told:
             told(f"fitting by {method}")
-            found = _fitted(vehicle, batch(vehicle, recordings), method, str(vehicle_path))
-            told("asking what the recordings identify")
+            found = _fitted(vehicle, stacked, method, str(vehicle_path))
+            told(f"asking what the recordings identify{effort.left()}")
             identified = _identified(found, method, ", ".join(map(str, runs)))
         terminal.emit(identified.to_json(), lambda: _show(identified))
         terminal.warn(identified.findings)

@@ -142,3 +142,14 @@ def test_vehicle_without_free_coefficients_is_one_line(files, monkeypatch, capsy
         identify(monkeypatch, capsys, files)
     assert stop.value.code == 2
     assert "all coefficients are fixed" in capsys.readouterr().err
+
+
+def test_long_runs_are_announced_with_memory_and_time_left(files, monkeypatch, capsys):
+    """Claim: where runs are long, standard error says samples, memory and time before the fit, and time left after."""
+    monkeypatch.setattr("jaxsub.cli.effort._LONG", 100)
+    arguments = ["jaxsub", "identify", *(str(files / name) for name in ("vehicle.toml", "run.csv"))]
+    monkeypatch.setattr("sys.argv", [*arguments, "--out", str(files / "out")])
+    main()
+    said = capsys.readouterr().err
+    assert re.search(r"120 samples of 2 channels: takes about [\d.]+ GB and \d+ s", said)
+    assert re.search(r"about \d+ (s|min) left", said)

@@ -1,0 +1,48 @@
+"""`jaxsub identify` on long runs stays within bounded memory."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rigs import driven, oscillator
+
+from jaxsub.recording import save
+from jaxsub.simulate import synthetic
+from jaxsub.vehicle import write_vehicle
+
+_SCRIPT = """
+import resource, sys
+sys.argv = ["jaxsub", "identify", *sys.argv[1:]]
+from jaxsub.cli import main
+main()
+print("peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def peak(folder: Path, samples: int) -> float:
+    """Peak memory (MB) of `identify` on so many samples of an oscillator."""
+    vehicle = oscillator()
+    asked = driven(vehicle, 0.1 * np.arange(samples), seed=1, amplitude=1.0)
+    save(synthetic(vehicle, [asked], seed=1)[0], folder / "run.csv")
+    write_vehicle(vehicle, folder / "vehicle.toml")
+    paths = [str(folder / name) for name in ("vehicle.toml", "run.csv")]
+    command = [sys.executable, "-c", _SCRIPT, *paths, "--out", str(folder / f"out-{samples}")]
+    environment = os.environ | {"XDG_CACHE_HOME": str(folder)}
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=environment, check=True)
+    assert "The fit explains these runs" in done.stdout
+    return int(done.stdout.split()[-1]) / 1e3
+
+
+@pytest.mark.long
+def test_memory_grows_by_bounded_bytes_a_row(tmp_path):
+    """Claim: from 100 000 to 300 000 rows the peak grows by less than 1.6 kB a row."""
+    assert (peak(tmp_path, 300_000) - peak(tmp_path, 100_000)) * 1e6 / 200_000 < 1600.0
+
+
+@pytest.mark.long
+def test_a_million_rows_are_identified(tmp_path):
+    """Claim: 1 000 000 rows end within 600 s and 2 GB."""
+    assert peak(tmp_path, 1_000_000) < 2000.0
