@@ -86,12 +86,18 @@ def is_read_or_refused(make, name):
         comes_back(vehicle)
 
 
+def told(vehicle):
+    """What is said of each number; one without a prior says nothing by its mean."""
+    mean = lambda row: row.prior_mean if math.isfinite(row.prior_std) else 0.0
+    return {row.name: dataclasses.replace(row, prior_mean=mean(row)) for row in vehicle.layout.parameters}
+
+
 def comes_back(vehicle):
     """Raises where the vehicle that its own file describes is another."""
     text = vehicle_text(vehicle)
     again = vehicle_from(tomllib.loads(text), "again.toml")
     assert dataclasses.replace(again.layout, parameters=()) == dataclasses.replace(vehicle.layout, parameters=())
-    rows, came = ({row.name: row for row in v.layout.parameters} for v in (vehicle, again))
+    rows, came = (told(v) for v in (vehicle, again))
     assert {name: row for name, row in came.items() if name in rows} == rows
     # what followed from other numbers is written too
     assert not any(row.free for name, row in came.items() if name not in rows)
