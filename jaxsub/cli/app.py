@@ -1,16 +1,15 @@
 """Commands of `jaxsub` (formats.md)."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ..errors import InputError, OutputError
+from . import process
 from .options import common
 
-_PATH = click.Path(path_type=Path)
+_PATH = process.Location()
 # said here and not asked of `estimate`, so that `--help` needs no jax; a test holds the two together
 METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
 STARTS = ("rest", "recorded", "estimated")
@@ -24,10 +23,19 @@ def _out(**settings: object) -> Callable:
     return click.option("--out", type=_PATH, help="Where the results go.", **settings)  # pyright: ignore[reportArgumentType]
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=process.Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]}
+)
 @click.version_option(package_name="jaxsub")
-def app() -> None:
-    """Fit a vehicle to recordings, and name the physics it leaves out."""
+@common
+@click.pass_context
+def app(context: click.Context) -> None:
+    """Fit a vehicle to recordings, and name the physics it leaves out.
+
+    --quiet, --json, --strict and --debug may stand before the command or after it.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
 
 
 @app.command()
@@ -165,19 +173,5 @@ def sweep(out: Path, overwrite: bool, **arguments: Any) -> None:
 
 
 def main() -> None:
-    """The `jaxsub` command: exit 0 done, 2 bad input with one line on stderr, 1 anything else."""
-    try:
-        app(standalone_mode=False, prog_name="jaxsub")
-    except InputError as error:
-        _stop(str(error), 1 if isinstance(error, OutputError) else 2)
-    except click.UsageError as error:
-        _stop(f"{' '.join(error.format_message().split())}; see jaxsub --help", 2)
-    except (KeyboardInterrupt, click.Abort) as error:
-        _stop(str(error) or "interrupted; nothing was written", 1)
-    except Exception as error:
-        _stop(f"{type(error).__name__}: {' '.join(str(error).split())[:500]}", 1)
-
-
-def _stop(message: str, code: int) -> None:
-    print(f"jaxsub: {message}", file=sys.stderr)
-    sys.exit(code)
+    """The `jaxsub` command; `process.run` says what its exit codes mean."""
+    process.run(app)

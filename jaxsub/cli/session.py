@@ -1,14 +1,21 @@
 """What every command sets up: double precision and the compilation cache."""
 
 import gc
+import glob
 import os
+import re
+import warnings
 from pathlib import Path
+from typing import Any
 
 import jax
 import platformdirs
 
+from . import terminal
+
 # up to a third less time, for programs that run as fast; on jax 0.10 half, for programs up to a quarter slower
 _QUICKLY, _QUICKER = "--xla_backend_optimization_level=1", "--xla_cpu_use_fusion_emitters=false"
+_CACHE_FAILS = r"Error (reading|writing) persistent compilation cache entry for '([^']*)'"
 
 
 def start(long: bool = False) -> None:
@@ -21,10 +28,47 @@ def start(long: bool = False) -> None:
     # tracing makes millions of short-lived objects, and collecting them at the default threshold costs seconds
     gc.set_threshold(200_000, 50, 50)
     jax.config.update("jax_enable_x64", True)
-    folder = Path(platformdirs.user_cache_dir("jaxsub")) / f"jax-{jax.__version__}"
+    _keep_programs(Path(platformdirs.user_cache_dir("jaxsub")) / f"jax-{jax.__version__}")
+
+
+def _keep_programs(folder: Path) -> None:
+    """Keep compiled programs in `folder`; without one that can be made, go on and compile them every time."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        terminal.note(f"note: compiled programs are not kept: {folder}: {error.strerror}; set XDG_CACHE_HOME")
+        return
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    _repair(folder)
+
+
+def _repair(folder: Path) -> None:
+    """Remove damaged entries of the cache in `folder` when JAX meets them, and say so once.
+
+    JAX warns of an entry that it cannot read, compiles, and does not write where a file is: the damage would stay. The
+    warning comes before it compiles, so a file removed at the warning is written anew by the same run.
+    """
+    warnings.filterwarnings("always", message=_CACHE_FAILS)
+    show, said = warnings.showwarning, set()
+
+    def repair(message: Warning | str, *where: Any, **more: Any) -> None:
+        found = re.match(_CACHE_FAILS, str(message))
+        if found is None:
+            show(message, *where, **more)
+            return
+        failed, program = found.groups()
+        if failed == "reading":
+            # the name's other entries go too: which of them is damaged the warning does not say
+            for entry in folder.glob(f"{glob.escape(program)}-*"):
+                entry.unlink(missing_ok=True)
+        if failed not in said:
+            said.add(failed)
+            done = {"reading": "damaged entries are replaced", "writing": "a compiled program could not be kept"}
+            terminal.note(f"note: {folder}: {done[failed]}")
+
+    warnings.showwarning = repair
 
 
 def _compile_quickly() -> None:

@@ -1,0 +1,116 @@
+"""The command as a process: exit codes, signals, and one line for each way in which it ends early."""
+
+import difflib
+import os
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import Any, NoReturn
+
+import click
+
+from ..errors import InputError, OutputError
+from .options import Options
+
+_LONGEST_NAME, _LONGEST_PATH, _LONGEST_MESSAGE = 255, 4095, 500
+_INTERRUPTED = 130
+
+
+class Interrupted(Exception):
+    """Ctrl-C or SIGTERM; not an ordinary `KeyboardInterrupt`, for which click prints an empty line."""
+
+
+class Location(click.ParamType):
+    """A path that an operating system can take: no NUL, no name that is too long."""
+
+    name = "path"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """`value` as a path.
+
+        Raises
+            click.BadParameter: it holds a NUL or is longer than file systems allow.
+        """
+        raw = os.fsencode(value)
+        if b"\0" in raw:
+            self.fail("the path holds a NUL character", param, ctx)
+        if len(raw) > _LONGEST_PATH or max(map(len, raw.split(b"/"))) > _LONGEST_NAME:
+            limit = f"{_LONGEST_NAME} bytes a name, {_LONGEST_PATH} in all"
+            self.fail(f"the path is {len(raw)} bytes long, beyond what file systems allow ({limit})", param, ctx)
+        return Path(value)
+
+
+class Commands(click.Group):
+    """Commands of which a mistyped one is told its nearest neighbour."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that `args` name.
+
+        Raises
+            click.UsageError: there is no such command.
+        """
+        name = args[0]
+        if self.get_command(ctx, name) is None and not name.startswith("-"):
+            near = difflib.get_close_matches(name, self.list_commands(ctx), 1)
+            ctx.fail(f"no command {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command.
+
+        Raises
+            Interrupted: by Ctrl-C or SIGTERM.
+        """
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise Interrupted(str(error) or "interrupted; nothing was written") from None
+
+
+def run(app: click.Group) -> None:
+    """Run `app` on the process's arguments.
+
+    Exit codes: 0 done, 1 an unexpected error or an output that could not be written, 2 bad input, 3 warnings with
+    `--strict`, 130 interrupted.
+    """
+    options = Options()
+    # a batch system's SIGTERM ends a command as Ctrl-C does, so that what it began is cleared away
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        app(standalone_mode=False, prog_name="jaxsub", obj=options)
+        sys.stdout.flush()
+    except InputError as error:
+        _stop(str(error), 1 if isinstance(error, OutputError) else 2)
+    except click.UsageError as error:
+        command = error.ctx.command_path if error.ctx else "jaxsub"
+        _stop(f"{_short(error.format_message())}; see {command} --help", 2)
+    except (Interrupted, KeyboardInterrupt, click.Abort) as error:
+        _stop(str(error) or "interrupted; nothing was written", _INTERRUPTED)
+    except BrokenPipeError:
+        # the reader has what it wants; Python's own flush at the end would complain
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except Exception as error:
+        if options.debug:
+            traceback.print_exc()
+        how = "report it with the files and" if options.debug else "run it again with --debug and report"
+        _stop(f"unexpected {type(error).__name__}: {_short(str(error))}; {how} the traceback", 1)
+    if options.strict and options.warnings:
+        _stop(f"{options.warnings} warnings, and --strict allows none", 3)
+
+
+def _interrupt(*_: Any) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _short(message: str) -> str:
+    line = " ".join(message.split()).rstrip(".")
+    return line if len(line) <= _LONGEST_MESSAGE else f"{line[:_LONGEST_MESSAGE]}…"
+
+
+def _stop(message: str, code: int) -> NoReturn:
+    print(f"jaxsub: {message}", file=sys.stderr)
+    sys.exit(code)

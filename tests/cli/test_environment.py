@@ -1,0 +1,52 @@
+"""Commands set themselves up without a home and with a damaged cache of compiled programs."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = """
+from jaxsub.cli import session
+session.start()
+import jax, jax.numpy as jnp
+def tripled(x):
+    return 3.0 * x
+print(jax.jit(tripled)(jnp.arange(3.0)))
+"""
+
+
+def ran(**environment):
+    base = {name: value for name, value in os.environ.items() if name not in ("HOME", "XDG_CACHE_HOME", "XLA_FLAGS")}
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        env=base | {"PYTHONPATH": str(ROOT), "JAX_PLATFORMS": "cpu"} | environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "[0. 3. 6.]\n"
+    return done.stderr
+
+
+@pytest.mark.parametrize("home", ["/proc/none", "/dev/null"])
+def test_without_a_home_that_can_be_written_it_goes_on_and_says_so(home):
+    said = ran(HOME=home)
+    assert said.count("\n") == 1 and said.startswith("note: compiled programs are not kept")
+
+
+@pytest.mark.parametrize("damage", [lambda entry: entry[: len(entry) // 2], lambda entry: b"", lambda entry: b"x" * 99])
+def test_damaged_programs_are_replaced_with_one_note(tmp_path, damage):
+    assert ran(XDG_CACHE_HOME=str(tmp_path)) == ""
+    entries = sorted(tmp_path.rglob("*-cache"))
+    assert any("tripled" in entry.name for entry in entries)
+    for entry in entries:
+        entry.write_bytes(damage(entry.read_bytes()))
+    damaged = {entry: entry.read_bytes() for entry in entries}
+    said = ran(XDG_CACHE_HOME=str(tmp_path))
+    assert said.count("\n") == 1 and "damaged entries are replaced" in said
+    assert all(entry.read_bytes() != before for entry, before in damaged.items())
+    assert ran(XDG_CACHE_HOME=str(tmp_path)) == ""
