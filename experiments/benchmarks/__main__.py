@@ -6,6 +6,7 @@ Each part runs in a process of its own; `results.json` holds all, with what was 
 - `likelihood`, `batched`: a likelihood, its gradient and Jacobian, beside CasADi's, and the floor.
 - `throughput`: a filter, beside filterpy and dynamax.
 - `score_pass`, `diagnose`: 200 candidates at once, beside refits of each; the command, cold and warm.
+- `identify`: the command on two coordinates and 400 samples, cold and again.
 - `growth`: time and memory with samples, batch, coefficients and candidates.
 - `accelerator`: batches and a sweep on the device that JAX picks, which needs no peers: for machines with a GPU.
 """
@@ -30,6 +31,7 @@ _PARTS = {
     "throughput": ("throughput", "run"),
     "score_pass": ("diagnosis", "score_pass"),
     "diagnose": ("diagnosis", "whole"),
+    "identify": ("identification", "whole"),
     "growth": ("growth", "run"),
     "accelerator": ("accelerator", "run"),
     "figure": ("figure", "run"),

@@ -1,5 +1,7 @@
 """What identifying a vehicle from long runs will take: memory, time, and the time left."""
 
+import contextlib
+import ctypes
 import time
 
 from ..recording.runs import Runs
@@ -8,11 +10,23 @@ from ..vehicle import AbstractVehicle
 # samples from which on a command says what it will take
 _LONG = 100_000
 # bytes that the program itself takes; doubles kept at once for each column of the channels' Jacobian, and of the step's
-_BASE, _BY_COLUMN, _BY_STEP = 4.5e8, 10, 4
+_BASE, _BY_COLUMN, _BY_STEP = 4.5e8, 6, 2
 # s for programs to be compiled, and for each sample and column of the Jacobian, on one core of 2024
 _COMPILE, _EACH = 20.0, 3e-6
 # what follows the fit takes this part of the fit's own time
 _AFTER = 0.9
+
+# glibc's number for the size from which on memory is mapped, and that size in bytes
+_M_MMAP_THRESHOLD, _MAPPED = -3, 1_000_000
+
+
+def return_memory() -> None:
+    """Let large arrays go back to the system once they are freed, where the C library can be told to.
+
+    glibc keeps blocks of up to 32 MB, which a million samples of a channel are: 1.7 GB at most and not 1.2 GB.
+    """
+    with contextlib.suppress(OSError, TypeError, AttributeError):
+        ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _MAPPED)
 
 
 class Effort:

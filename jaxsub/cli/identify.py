@@ -15,7 +15,7 @@ from ..identifiability import coloured_covariance, identifiability
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
-from .effort import Effort
+from .effort import Effort, return_memory
 from .identification import Identification
 from .output import fresh_folder, paths_of
 from .runs import load_runs
@@ -39,6 +39,7 @@ def run(
     The verdict is shown before anything is written. What is interrupted after the fit keeps the fit.
     """
     session.start()
+    return_memory()
     with fresh_folder(out, overwrite, paths_of(vehicle_path, *runs, columns)) as folder:
         vehicle = read_vehicle(vehicle_path)
         require_free(vehicle, str(vehicle_path))
