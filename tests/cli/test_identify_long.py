@@ -38,8 +38,8 @@ def peak(folder: Path, samples: int) -> float:
 
 @pytest.mark.long
 def test_memory_grows_by_bounded_bytes_a_row(tmp_path):
-    """Claim: from 100 000 to 300 000 rows the peak grows by less than 1.1 kB a row."""
-    assert (peak(tmp_path, 300_000) - peak(tmp_path, 100_000)) * 1e6 / 200_000 < 1100.0
+    """Claim: from 100 000 to 300 000 rows the peak grows by less than 1.3 kB a row."""
+    assert (peak(tmp_path, 300_000) - peak(tmp_path, 100_000)) * 1e6 / 200_000 < 1300.0
 
 
 @pytest.mark.long
