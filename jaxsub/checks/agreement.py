@@ -186,7 +186,7 @@ def _refined(pair: _Pair, length: int, lag: float, step: float, rate: np.ndarray
         width = 1.5 * width if top[1] in (lags[0], lags[-1]) and abs(top[1]) < furthest else width / 3.0
         centre, lag = top[2], top[1]
     # a signal that grows or swings regularly looks alike at many delays: one is believed where it gains much
-    if (without is not None and _gain(without, centre) < _SIGNIFICANT) or abs(lag) <= step:
+    if (without is not None and _gain(without, centre) < _SIGNIFICANT) or abs(lag) <= 1.5 * step:
         centre, lag = without or centre, 0.0
     known = rate[np.isfinite(rate)]
     low, high = sorted((centre.low, centre.high), key=abs)

@@ -12,9 +12,11 @@ from .spans import amount, at_rows, counted, of_run
 _FEWEST = 10  # samples: of fewer nothing is said
 _NOISY = 0.3  # of the samples repeat their neighbour: beyond it a channel is coarse, and a long repeat is no fault
 _CHANCE = 1e-6  # that so long a repeat is in a run by chance
+_SIDE = 24  # rows looked at on either side of a stretch
+_SLOW = 0.3  # of the usual difference there
 _REGULAR = 0.95  # of the repeats have the slow sensor's length
 _CHANGES = 20
-_PILE = 4.0  # times the samples at the next levels
+_PILE = 2.0  # times the samples within a usual difference of it
 _CLIPPED = 0.01  # of the samples
 
 
@@ -79,7 +81,8 @@ def stuck(recording: Recording, channel: Channel, values: np.ndarray) -> tuple[n
     """`values` (samples,) without stretches of one value in a channel that otherwise changes at every row.
 
     A stretch is too long if chance would give one so long in a run in a million, at the share of rows that repeat
-    their neighbour outside of long stretches.
+    their neighbour outside of long stretches. It also begins and ends suddenly: a vehicle that comes to rest, or a
+    coarse sensor at the end of a swing, slows down before.
     """
     rows = np.flatnonzero(np.isfinite(values))
     if channel.role != "measured" or rows.size < 5 * _FEWEST:
@@ -95,6 +98,8 @@ def stuck(recording: Recording, channel: Channel, values: np.ndarray) -> tuple[n
         return values, []
     longest = max(_FEWEST, math.ceil(math.log(_CHANCE / there.size) / math.log(max(share, 0.01))))
     long = lengths >= longest
+    for index in np.flatnonzero(long):
+        long[index] = _sudden(there, int(edges[index]), int(edges[index + 1]))
     if not long.any():
         return values, []
     chosen = np.zeros(values.shape, bool)
@@ -107,8 +112,24 @@ def stuck(recording: Recording, channel: Channel, values: np.ndarray) -> tuple[n
     return np.where(chosen, np.nan, values), [finding]
 
 
+def _sudden(values: np.ndarray, first: int, after: int) -> bool:
+    """Whether the stretch of `values` (n,) from `first` until before `after` has motion up to both its ends."""
+    before = np.abs(np.diff(values[max(first - _SIDE, 0) : first]))
+    behind = np.abs(np.diff(values[after : after + _SIDE]))
+    if min(before.size, behind.size) < _SIDE // 2:
+        return False
+    # a coarse sensor at rest shows two or three levels
+    levels = min(np.unique(values[first - before.size - 1 : first]).size, np.unique(values[after : after + _SIDE]).size)
+    moving = levels > _SIDE // 3 and all(np.mean(side == 0.0) <= 0.1 for side in (before, behind))
+    # a sensor that repeats its last value does not jump to it, but from it
+    jump = max(abs(values[after] - values[after - 1]), abs(values[first] - values[first - 1]))
+    leaves = jump >= _SLOW * np.median(behind)
+    slowing = np.median(before[-5:]) < 0.1 * np.median(before)
+    return bool(moving and leaves and not slowing)
+
+
 def clipped(recording: Recording, channel: Channel, values: np.ndarray) -> list[Finding]:
-    """A warning where a measured channel has many samples at its largest or least value, and few just inside."""
+    """A warning where a measured channel stays at an extreme more than once, and is seldom close to it."""
     there = values[np.isfinite(values)]
     if channel.role != "measured" or there.size < 5 * _FEWEST:
         return []
@@ -117,10 +138,12 @@ def clipped(recording: Recording, channel: Channel, values: np.ndarray) -> list[
         count = int(np.count_nonzero(there == extreme))
         if count < max(_FEWEST, _CLIPPED * there.size) or count > 0.9 * there.size:
             continue
-        levels, counts = np.unique(there, return_counts=True)
-        inside = counts[1:4] if extreme == levels[0] else counts[-4:-1]
+        steps = np.abs(np.diff(there))
+        # a swing of a channel slows down before its end, and leaves many samples close to it
+        close = np.abs(there - extreme) <= 1.5 * np.median(steps[steps > 0.0])
+        inside = int(np.count_nonzero(close)) - count
         runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], values == extreme, [0]]))))[::2]
-        if levels.size < _FEWEST or count < _PILE * float(inside.max()) or float(runs.max()) < 3:
+        if np.unique(there).size < _FEWEST or count < _PILE * inside or np.count_nonzero(runs >= 3) < 2:
             continue
         what = f"{counted(values == extreme, values)} at its extreme of {amount(extreme, channel.unit)}: clipped?"
         remedy = "blank those cells, or give the sensor its limits as an effect sensor-saturation"

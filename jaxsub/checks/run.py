@@ -12,6 +12,8 @@ from ..vehicle import AbstractVehicle, Layout, vehicle_findings
 from .channels import Channel, channels_of
 from .consistency import consistency
 from .duplicates import duplicates
+from .excitation import idle_inputs
+from .modes import modes
 from .ranges import impossible, sample_interval
 from .repeats import clipped, constant, slow_sensor, stuck
 from .sampling import late_start, pieces
@@ -56,6 +58,9 @@ def check(vehicle: AbstractVehicle, recordings: Sequence[Recording], held_out: S
         parts, findings = _run(recording, layout, known, speed)
         mended.append(parts)
         found += findings
+    if not any(finding.severity == "error" for finding in found):
+        used = [part for parts in mended for part in parts]
+        found += [*modes(vehicle, used), *idle_inputs(vehicle, used)]
     order = ("error", "warning", "note")
     ranked = sorted(found, key=lambda finding: order.index(finding.severity))
     flat = lambda groups: tuple(part for parts in groups for part in parts)
@@ -79,7 +84,8 @@ def _run(recording: Recording, layout: Layout, known: set[str], speed: float) ->
         for mend in (sentinels, impossible, slow_sensor, stuck):
             values, more = mend(recording, channel, values)
             findings += more
-        for mend in (spikes, turning):
+        # a body's angles may have spikes before their turns are counted; a mechanism's show by their jumps alone
+        for mend in (spikes, turning) if body else (turning, spikes):
             values, more = mend(recording, channel, values, body)
             findings += more
         findings += clipped(recording, channel, values)

@@ -11,7 +11,7 @@ _ROBUST = 1.4826  # standard deviations of a normal density in its median absolu
 _DEVIATIONS = 8.0
 _USUAL = 4.0  # times the 95th percentile of the differences
 _SIGMAS = 10.0
-_QUANTA = 6.0
+_QUANTA = 10.0
 _RETURN = 0.6  # the lesser of rise and fall over the larger: what falls slower is the answer to a push
 _FEW = 0.02  # of the samples: more are how the channel is
 _WIDTHS = (1, 2)  # rows that a spike may last
@@ -21,7 +21,7 @@ def spikes(recording: Recording, channel: Channel, values: np.ndarray, body: boo
     """`values` (samples,) without spikes, and a warning.
 
     A spike leaves the samples before and after it, on one side, by more than 8 robust standard deviations and 4 times
-    the 95th percentile of the channel's differences, 10 σ of its sensor and 6 steps of its resolution. A step does not
+    the 95th percentile of the channel's differences, 10 σ of its sensor and 10 steps of its resolution. A step does not
     come back, so it is none. A measured spike is masked, a prescribed one interpolated; of a held input, which may be
     a pulse, nothing is said.
     """

@@ -30,10 +30,10 @@ def turning(recording: Recording, channel: Channel, values: np.ndarray, body: bo
         whole = unwrapped_mechanism(values) if rad else None
     if whole is None:
         return values, []
-    turned = np.round((whole - values) / (2.0 * np.pi))
-    jumps = np.concatenate([[False], np.diff(turned) != 0.0]) & np.isfinite(whole)
-    # a missing sample is no jump; the next that is measured may be
-    jumps &= np.isfinite(values)
+    rows = np.flatnonzero(np.isfinite(values))
+    turned = np.diff(np.round((whole - values)[rows] / (2.0 * np.pi)))
+    jumps = np.zeros(values.shape, bool)
+    jumps[rows[1:][turned != 0.0]] = True
     if not jumps.any():
         return whole, []
     count = int(np.count_nonzero(jumps))
