@@ -11,6 +11,7 @@ from ..discrepancy import Diagnosis
 from ..discrepancy import diagnose as diagnose_runs
 from ..discrepancy.next_run import next_run, said
 from ..effects import AbstractEffect, from_script, vocabulary
+from ..estimate import require_free
 from ..plain import to_json
 from ..recording import Recording, hold_out, save
 from ..report import write_report
@@ -43,6 +44,7 @@ def run(
     require_replaceable(out, overwrite, inputs)
     own = () if script is None else from_script(script)
     vehicle = read_vehicle(vehicle_path, own)
+    require_free(vehicle, str(vehicle_path))
     recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
     train, judged = (recordings, unseen) if held else hold_out(recordings)
     with fresh_folder(out, overwrite, inputs) as folder:

@@ -16,6 +16,7 @@ from scipy import special
 
 from ..findings import Finding
 from ..likelihood.whiteness import portmanteau_by_channel, predicted_share
+from ..plain import plain
 from .fit import Ended, Fit, output_errors
 
 # probability of a false alarm of each test
@@ -143,7 +144,7 @@ class Assessment:
         """The assessment as JSON has it."""
         found = dataclasses.asdict(self)
         tests = {"size": self.size, "whiteness": self.white, "spikes": self.spikes}
-        return {"explains": self.explains, "verdict": self.verdict(), "p_values": tests} | found
+        return plain({"explains": self.explains, "verdict": self.verdict(), "p_values": tests} | found)
 
     def _rejected_share(self, channel: ChannelResidual, p_value: float | None, share: float, matters: float) -> bool:
         # beside a σ that is known, what is small against it does not matter: rounding in runs without noise

@@ -171,7 +171,12 @@ def share_for(problem: Problem) -> int:
 def shares_at_once() -> int:
     """How many shares are worked on side by side: one on each device, and on a single CPU one on each core."""
     devices = jax.local_device_count()
-    return os.cpu_count() or 1 if devices == 1 and jax.default_backend() == "cpu" else devices
+    return _cores() if devices == 1 and jax.default_backend() == "cpu" else devices
+
+
+def _cores() -> int:
+    """The cores that this process may run on: in a batch job or a container fewer than the machine has."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _room() -> tuple[float, int]:

@@ -79,8 +79,8 @@ def read(path: Path) -> tuple[Contents, str, str]:
             source = f"{file}{MARK}{found}"
             contents = _of_suffix(_READERS, target, source)(target, source)
             return contents, PurePosixPath(found).stem if member else file.stem, source
-    reader = _of_suffix(_READERS, path, str(path))
     require_file(path)
+    reader = _of_suffix(_READERS, path, str(path))
     return reader(path, str(path)), path.stem, str(path)
 
 

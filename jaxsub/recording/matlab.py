@@ -1,6 +1,8 @@
 """Recordings as MATLAB files (.mat), of version 4 to 7 and, as HDF5, 7.3, read by pymatreader."""
 
 import struct
+import subprocess
+import sys
 import warnings
 import zlib
 from collections.abc import Iterator, Mapping
@@ -30,6 +32,7 @@ def read_matlab(path: Path, source: str) -> Contents:
     reader = optional("pymatreader", "files", source)
     with reading(source, "a MATLAB file"):
         _check(path, source)
+        _require_loadable(path, source)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about classes that it cannot read; they are refused when asked for
             found = reader.read_mat(path)
@@ -42,6 +45,17 @@ def read_matlab(path: Path, source: str) -> Contents:
         place, values = next(iter(tables.items()), ("", found))
         notes = [note(source, "dialect", f"is read from the struct {place}")] if place else []
         return Contents(_columns(source, values), tuple(notes))
+
+
+def _require_loadable(path: Path, source: str) -> None:
+    """Raise InputError where SciPy's reader of versions 4 to 7 ends its process, as it does on some damaged files."""
+    if h5py.is_hdf5(path):
+        return
+    trial = "import sys, scipy.io; scipy.io.loadmat(sys.argv[1])"
+    done = subprocess.run([sys.executable, "-c", trial, str(path.absolute())], capture_output=True)
+    if done.returncode < 0:
+        what = f"ends the reader of MATLAB files (signal {-done.returncode})"
+        raise InputError(source, what, "check that it is whole, or save it anew")
 
 
 def _check(path: Path, source: str) -> None:

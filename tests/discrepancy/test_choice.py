@@ -12,7 +12,7 @@ from diagnosis_cases import recorded, wrong
 from experiments.concealed_physics.generate import generate
 from experiments.concealed_physics.plan import cases
 from experiments.next_manoeuvre.cases import case
-from jaxsub.cli.session import load_runs
+from jaxsub.cli.runs import load_runs
 from jaxsub.discrepancy import batch, diagnose
 from jaxsub.discrepancy.explain import after_all
 from jaxsub.discrepancy.model import join, told

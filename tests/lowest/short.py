@@ -1,39 +1,71 @@
 """A short run of the whole package, for an environment with the lowest versions that pyproject.toml allows.
 
-Imports every module and identifies a vehicle from a recording of itself; `--diagnose` diagnoses it too.
+Imports every module, then identifies and diagnoses a vehicle from recordings of itself by the command line. The second
+identification reads its programs from the cache that the first has filled: both must find the vehicle's coefficients.
 """
 
 import importlib
+import json
+import os
 import pkgutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+import jax
 import numpy as np
 
 import jaxsub
 from jaxsub.recording import Recording, save
 from jaxsub.simulate.synthetic import synthetic
-from jaxsub.vehicle import vehicle_text
+from jaxsub.vehicle import AbstractVehicle, vehicle_text
 from jaxsub.vehicle.catalogue import dsrv
 
 BEGIN = "import sys; from jaxsub.cli import main; sys.argv[0] = 'jaxsub'; main()"
+# standard errors that an estimate may be off
+FAR = 5.0
 
 
 def main() -> None:
     for module in pkgutil.walk_packages(jaxsub.__path__, "jaxsub."):
         importlib.import_module(module.name)
+    jax.config.update("jax_enable_x64", True)
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "vehicle.toml").write_text(vehicle_text(dsrv()), encoding="utf-8")
+        folder, vehicle = Path(name), dsrv()
+        (folder / "vehicle.toml").write_text(vehicle_text(away(vehicle)), encoding="utf-8")
         t = 0.25 * np.arange(200)
-        driven = Recording("run", t, {"delta_s": 0.2 * np.sign(np.sin(0.5 * t))}, "made")
-        (recording,) = synthetic(dsrv(), [driven], seed=0)
-        save(recording, folder / "run.csv")
-        for command in ["identify", *(["diagnose"] if "--diagnose" in sys.argv else [])]:
-            files = [command, str(folder / "vehicle.toml"), str(folder / "run.csv"), "--out", str(folder / command)]
-            subprocess.run([sys.executable, "-c", BEGIN, *files], check=True)
+        for seed in (1, 2):
+            driven = Recording("run", t, {"delta_s": 0.2 * np.sign(np.sin(0.5 * seed * t))}, "made")
+            (recording,) = synthetic(vehicle, [driven], seed=seed)
+            save(recording, folder / f"run{seed}.csv")
+        for cache in ("empty", "filled"):
+            require_true(command(folder, "identify", "run1.csv", "--out", cache), vehicle, cache)
+        found = command(folder, "diagnose", "run1.csv", "run2.csv", "--no-manoeuvre", "--out", "diagnosed")
+        assert found["verdict"] == "none", found["verdict"]
+
+
+def away(vehicle: AbstractVehicle) -> AbstractVehicle:
+    """The vehicle with every free coefficient 10 % off."""
+    values = vehicle.values()
+    return vehicle.with_values({row.name: 1.1 * values[row.name] for row in vehicle.layout.free})
+
+
+def command(folder: Path, name: str, *words: str) -> dict:
+    """What `jaxsub name vehicle.toml …` prints as JSON; it must end with 0 and without a warning."""
+    environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
+    words = (name, "vehicle.toml", *words, "--json", "--strict")
+    done = subprocess.run(
+        [sys.executable, "-c", BEGIN, *words], cwd=folder, env=environment, stdout=subprocess.PIPE, check=True
+    )
+    return json.loads(done.stdout)
+
+
+def require_true(identified: dict, vehicle: AbstractVehicle, cache: str) -> None:
+    """Every coefficient is identified and near the vehicle's."""
+    for name, found in identified["coefficients"].items():
+        error = abs(found["value"] - float(vehicle.values()[name])) / found["standard_error"]
+        assert error < FAR, f"{name} is {error:.1f} standard errors off with an {cache} cache"
 
 
 if __name__ == "__main__":

@@ -1,0 +1,5 @@
+"""`python -m jaxsub` is the command `jaxsub`."""
+
+from .cli import main
+
+main()
