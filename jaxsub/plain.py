@@ -27,8 +27,8 @@ def plain(content: Any) -> Any:
         return str(content)
     if dataclasses.is_dataclass(content) and not isinstance(content, type):
         return plain({field.name: getattr(content, field.name) for field in dataclasses.fields(content)})
-    # arrays and scalars of NumPy and JAX
-    return plain(content.tolist())
+    arrays: Any = content  # of NumPy and JAX, and their scalars
+    return plain(arrays.tolist())
 
 
 def finite_text(value: float, form: str = ".3g") -> str:

@@ -33,9 +33,9 @@ def modes(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> list[Fin
         return []
     values, vectors = np.linalg.eig(matrix)
     findings = []
-    growth, longest = float(values.real.max()), max(recording.duration for recording in recordings)
+    growth, longest = float(np.real(values).max()), max(recording.duration for recording in recordings)
     if growth > _SLOW:
-        mode = np.abs(vectors[: len(layout.equations), int(np.argmax(values.real))])
+        mode = np.abs(vectors[: len(layout.equations), int(np.argmax(np.real(values)))])
         name = layout.equations[int(np.argmax(mode))]
         severity = "warning" if growth * longest > _UNSTABLE else "note"
         what = f"is unstable in {name}: {growth:+.3g} 1/s, {amount(growth * longest)} e-folds in {amount(longest, 's')}"

@@ -130,7 +130,7 @@ def diagnose(
 @_columns
 @_overwrite
 @common
-def simulate(vehicle: Path, run: Path, out: Path, start: str, columns: Path | None, overwrite: bool) -> None:
+def simulate(vehicle: Path, run: Path, out: Path, start: Any, columns: Path | None, overwrite: bool) -> None:
     """Write the model's answer to a recording's inputs, as a recording, and show its errors."""
     from . import simulate as command
 

@@ -86,7 +86,7 @@ def _swept(asked: Asked, plan: Plan, folder: Path) -> dict[str, Any]:
         with terminal.progress("summarising") as say:
             say("basins and figures")
             summary = summarised(plan, dataset)
-        terminal.emit(summary, lambda: [_show(case) for case in summary["cases"]])
+        terminal.emit(summary, lambda: _show_all(summary["cases"]))
         _write(summary, dataset, folder)
     except KeyboardInterrupt as stop:
         kept = f"{done[0]} of {done[1]} are kept in {folder}, and the same command goes on"
@@ -162,6 +162,11 @@ def _write(summary: dict, dataset: xarray.Dataset, folder: Path) -> None:
     for picture in sweep_pictures(dataset, summary):
         store.keep(folder / _FIGURES / f"{picture.name}.png", picture.png)
     store.keep(folder / _RESULT, to_json(summary).encode())
+
+
+def _show_all(cases: Sequence[dict]) -> None:
+    for case in cases:
+        _show(case)
 
 
 def _show(case: dict) -> None:

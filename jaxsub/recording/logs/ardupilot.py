@@ -61,7 +61,7 @@ class DataFlash(Log):
                         name = f"{topic}.{field}"
                         samples.setdefault(name, []).append((_MICRO * message.TimeUS, float(getattr(message, field))))
                         units[name] = _unit(message, field)
-        return {name: Series(*np.array(pairs).T, units[name]) for name, pairs in samples.items()}
+        return {name: Series(*np.array(pairs).T, unit=units[name]) for name, pairs in samples.items()}
 
     @contextlib.contextmanager
     def _file(self) -> Iterator[Any]:
