@@ -66,9 +66,15 @@ def channels(path: str | os.PathLike[str]) -> list[Channel]:
     listed = []
     for header, values in read(path)[0].table:
         name, unit = split_header(header)
-        numbers = isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype.kind in "biufmM"
-        listed.append(Channel(name, unit or "", int((~np.isnan(values)).sum()) if numbers else 0))
+        listed.append(Channel(name, unit or "", _measured(values)))
     return listed
+
+
+def _measured(values: np.ndarray | InputError) -> int:
+    """How many samples of a column are numbers or times."""
+    if not isinstance(values, np.ndarray) or values.ndim != 1 or values.dtype.kind not in "biufmM":
+        return 0
+    return int((~np.isnan(values)).sum())
 
 
 def read(path: Path) -> tuple[Contents, str, str]:
@@ -79,8 +85,10 @@ def read(path: Path) -> tuple[Contents, str, str]:
             source = f"{file}{MARK}{found}"
             contents = _of_suffix(_READERS, target, source)(target, source)
             return contents, PurePosixPath(found).stem if member else file.stem, source
-    require_file(path)
+    if os.path.exists(path):
+        require_file(path)  # first, so that a folder is called one and not a file without an extension
     reader = _of_suffix(_READERS, path, str(path))
+    require_file(path)
     return reader(path, str(path)), path.stem, str(path)
 
 

@@ -77,9 +77,13 @@ def quick_columns(path: Path, dialect: Dialect, layout: Layout) -> list[Column] 
     # a blank row, a comment or a line break within a cell, and what only the careful reader may refuse
     if row != dialect.lines + 1 or any(column.error is not None for column in wanted.values()):
         return None
-    if any(_is_time(column) and np.isnan(column.samples("")).any() for column in wanted.values()):
+    if any(_is_time(column) and _missing(column.samples("")) for column in wanted.values()):
         return None
     return [wanted.get(index, column) for index, column in enumerate(known)]
+
+
+def _missing(values: np.ndarray | InputError) -> bool:
+    return isinstance(values, np.ndarray) and bool(np.isnan(values).any())
 
 
 def careful_columns(path: Path, source: str, dialect: Dialect, layout: Layout) -> list[Column]:
