@@ -69,6 +69,18 @@ def _render(
     return png(figure)
 
 
+def _limit(axes: Axes, times: np.ndarray, values: np.ndarray, spans: Sequence[tuple[float, float]]) -> None:
+    """Limits that show the samples outside of the `spans`: far values are cut off, and shaded all the same."""
+    measured = np.isfinite(values)
+    sound = measured & ~np.any([(times >= first) & (times <= last) for first, last in spans], axis=0)
+    shown = values[sound if sound.any() else measured]
+    if shown.size:
+        low, high = np.percentile(shown, (1.0, 99.0))
+        reach = max(float(high - low), 1e-12)
+        low, high = max(float(shown.min()), low - reach), min(float(shown.max()), high + reach)
+        axes.set_ylim(low - 0.05 * reach, high + 0.05 * reach)
+
+
 def _channel(axes: Axes, recording: Recording, name: str, findings: Sequence[Finding]) -> None:
     start, least = float(recording.times[0]), _NARROWEST * recording.duration
     values = recording.columns[name]
@@ -78,13 +90,7 @@ def _channel(axes: Axes, recording: Recording, name: str, findings: Sequence[Fin
             axes.axvspan(middle - half, middle + half, color=_COLORS[finding.severity], alpha=0.4, linewidth=0)
     times, drawn = thin(recording.times - start, values)
     axes.plot(times, drawn, color=IMPROVED, linewidth=0.8)
-    if drawn.size:
-        # far values are cut off, so that the rest can be seen; what was found is shaded all the same
-        low, high = np.percentile(drawn, (1.0, 99.0))
-        reach = max(float(high - low), 1e-12)
-        axes.set_ylim(
-            max(float(drawn.min()), low - reach) - 0.05 * reach, min(float(drawn.max()), high + reach) + 0.05 * reach
-        )
+    _limit(axes, recording.times, values, [span for finding in findings for span in finding.times])
     said = ", ".join(dict.fromkeys(finding.check for finding in findings if finding.channel == name))
     if said:
         axes.text(0.99, 0.97, drawable(said, 50), transform=axes.transAxes, ha="right", va="top", fontsize=7.5)
