@@ -38,7 +38,9 @@ def read_toml(path: Path) -> dict[str, Any]:
             name = str(path).replace("\0", "\\0")
             raise InputError(name, "is no path", "give the path of a vehicle file") from error
         # a number of 5000 digits and 5000 brackets are no TOMLDecodeError
-        raise InputError(str(path), f"is not TOML: {error}", "mend it at that place") from error
+        named = path.suffix.lower() == ".toml"
+        remedy = "mend it at that place" if named else "give the vehicle's .toml file first, then the runs"
+        raise InputError(str(path), f"is not TOML: {error}", remedy) from error
 
 
 def check_tree(data: Any, where: str) -> None:

@@ -75,7 +75,7 @@ def nothing(folder):
 # name: (what is done to the files, the arguments, words of the answer, commands that it applies to)
 FILES = ["vehicle.toml", "run.csv"]
 MISTAKES = {
-    "swapped": (nothing, ["run.csv", "vehicle.toml"], ("run.csv",), COMMANDS),
+    "swapped": (nothing, ["run.csv", "vehicle.toml"], ("run.csv", "first"), COMMANDS),
     "mistyped vehicle": (nothing, ["vehicel.toml", "run.csv"], ("vehicel.toml", "cannot be read"), COMMANDS),
     "mistyped run": (nothing, ["vehicle.toml", "rum.csv"], ("rum.csv", "no such file"), COMMANDS),
     "no run": (nothing, ["vehicle.toml"], ("RUN",), COMMANDS),
