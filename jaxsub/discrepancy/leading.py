@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
-from scipy.optimize import lsq_linear
 
 from ..estimate import Fit, Problem, estimate_disturbance
 from ..likelihood import Columns, Disturbance, Followed, follow, products, restricted_of
@@ -107,6 +106,8 @@ def _step(gram: np.ndarray, damped: float, low: np.ndarray, high: np.ndarray) ->
     if not np.any((step < low) | (step > high)):
         return step
     factor = np.linalg.cholesky(squares)
+    from scipy.optimize import lsq_linear
+
     return lsq_linear(factor.T, np.linalg.solve(factor, gram[1:, 0]), (low, high), method="bvls").x
 
 

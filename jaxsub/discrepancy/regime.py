@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy import stats
 
 from ..effects import Motion, by_name
 from .diagnosis import Regime
@@ -42,6 +41,8 @@ def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.
     if not variables or not _LEAST < share < 1.0 - _LEAST:
         return None
     names = [*variables]
+    from scipy import stats
+
     ranks = np.stack([stats.rankdata(variables[name][live]) for name in names])
     areas = _areas(ranks, inside[live])
     best = int(np.argmax(np.abs(areas - 0.5)))

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from .show import HeldOut, block_gains
 
@@ -48,6 +48,8 @@ def believed(ahead: float, variance: float) -> float:
     """
     variance = max(variance, _TINY)
     s = np.sqrt(variance)
+    from scipy import stats
+
     either = np.logaddexp(*stats.norm.logpdf(ahead, [0.5 * variance, -0.5 * variance], s))
     odds = either - np.log(2.0) - stats.norm.logpdf(ahead, 0.0, np.hypot(s, 0.5 * variance))
     right, neither = special.log_expit(odds), special.log_expit(-odds)

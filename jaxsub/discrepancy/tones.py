@@ -2,7 +2,7 @@
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy import fft, ndimage, signal
+from scipy import fft
 
 _TONES = 4
 # spectral lines between independent frequencies; independent frequencies on both sides that a tone stands out of
@@ -23,6 +23,8 @@ def tones(
     longest = float(np.max(times[live], initial=0.0))
     interval = float(np.median(np.diff(times, axis=1)[live[:, 1:]]))
     grid = np.arange(0.0, longest + 0.5 * interval, interval)
+    from scipy import ndimage, signal
+
     size = fft.next_fast_len(_LINES * len(grid), real=True) or 0
     whole = np.zeros((size // 2 + 1, force.shape[-1]), complex)
     for t, values, there in zip(times, force, live, strict=True):

@@ -4,7 +4,6 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.optimize import differential_evolution
 
 from .method import AbstractMethod, Found, costs, lanes_for, problems
 from .problem import Problem
@@ -64,6 +63,8 @@ class Global(AbstractMethod):
         return eqx.tree_at(lambda found: found.evaluations, found, found.evaluations + jnp.asarray(counts))
 
     def _evolve(self, problem: Problem, start: np.ndarray) -> tuple[np.ndarray, int]:
+        from scipy.optimize import differential_evolution
+
         centre, sampled = np.asarray(problem.coordinates()), 0
         box = np.stack([centre - self.span, centre + self.span], axis=1)
 

@@ -7,10 +7,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray
-from scipy import stats
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from .method import Found
 from .problem import Problem
@@ -62,6 +58,9 @@ class Rate:
     @property
     def interval(self) -> tuple[float, float]:
         """Lower and upper end."""
+        # imported here, since it takes longer than a fit of few samples
+        from scipy import stats
+
         ends = stats.binomtest(self.successes, self.count).proportion_ci(method="wilson")
         return float(ends.low), float(ends.high)
 
@@ -117,6 +116,10 @@ def _connected(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
     Where more than `_PAIRS` are that close, those that share a cell of a grid count as one point, a hundredth of
     `_REACH` wide and as much wider as it takes.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
     tree, member, width = KDTree(points), np.arange(len(points)), 0.0
     while tree.count_neighbors(tree, _REACH) > _PAIRS:
         width = 2.0 * width or 0.01 * _REACH / np.sqrt(points.shape[1])

@@ -2,16 +2,19 @@
 
 import re
 from collections.abc import Hashable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas
-import xarray
 
 from jaxsub.errors import InputError, nearest
 from jaxsub.findings import Finding
 from jaxsub.recording.recording import FIRST_ROW, Recording, check_column
 from jaxsub.units import TIME, column_to_si, split_header
+
+# imported where they are used: together they take longer than most files
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 # As read: headers, which may still occur twice, and numbers, text or objects; an error where a reader knows that a
 # column cannot be used.
@@ -20,12 +23,14 @@ Table = list[tuple[str, np.ndarray | InputError]]
 _ONE_NUMBER = "give one number a sample or leave the column out"
 
 
-def from_pandas(frame: pandas.DataFrame, name: str = "run") -> Recording:
+def from_pandas(frame: "pandas.DataFrame", name: str = "run") -> Recording:
     """The run in the columns of `frame`, headed `name` (SI) or `name[unit]`; a missing value is a missing sample.
 
     The time is the column `t`; else the index, if that is named `t` or holds times or spans. Instants count in s from
     the first. Raises InputError for whatever a file would be refused for, naming `name`.
     """
+    import pandas
+
     table: Table = [(str(header), _of_series(column)) for header, column in frame.items()]
     if not any(_is_time(header) for header, _ in table):
         index = frame.index
@@ -36,15 +41,17 @@ def from_pandas(frame: pandas.DataFrame, name: str = "run") -> Recording:
     return recorded(table, name, name)
 
 
-def to_pandas(recording: Recording, units: Mapping[str, str] | None = None) -> pandas.DataFrame:
+def to_pandas(recording: Recording, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
     """A frame as `from_pandas` reads it, in SI but for the columns that `units` names a unit for.
 
     Raises InputError for an absent column or an unknown unit.
     """
+    import pandas
+
     return pandas.DataFrame(recording.in_units(units or {}))
 
 
-def from_xarray(dataset: xarray.Dataset, name: str = "run") -> Recording:
+def from_xarray(dataset: "xarray.Dataset", name: str = "run") -> Recording:
     """The run in the variables of `dataset`, one number a sample each, `t` its times.
 
     A variable's unit is its attribute `units`, or stands in its name as in a file's header; without either it is SI.
@@ -53,11 +60,13 @@ def from_xarray(dataset: xarray.Dataset, name: str = "run") -> Recording:
     return recorded(variables(dataset, name), name, name)
 
 
-def to_xarray(recording: Recording, units: Mapping[str, str] | None = None) -> xarray.Dataset:
+def to_xarray(recording: Recording, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
     """A dataset along `t` as `from_xarray` reads it, in SI but for the columns that `units` names a unit for.
 
     Raises InputError for an absent column, an unknown unit or a name that NetCDF could not hold.
     """
+    import xarray
+
     dataset = xarray.Dataset()
     for header, values in recording.in_units(units or {}).items():
         name, _, unit = header.rstrip("]").partition("[")
@@ -111,7 +120,7 @@ def _in_si(
     return (samples, "") if unit is None else column_to_si(f"{source}, header {named[0]!r}", name, samples, unit)
 
 
-def variables(dataset: xarray.Dataset, source: str) -> Table:
+def variables(dataset: "xarray.Dataset", source: str) -> Table:
     """The variables of a dataset with their units in their headers."""
     along = next((variable.dims for name, variable in dataset.variables.items() if _is_time(str(name))), None)
     table: Table = []
@@ -149,7 +158,7 @@ def _parsed(source: str, header: str, cells: np.ndarray, first_row: int) -> np.n
             text = cell.decode() if isinstance(cell, bytes) else cell
             # float() would read 1_000 as a thousand
             if not isinstance(text, str):
-                numbers[index] = np.nan if text is None or text is pandas.NA else float(text)
+                numbers[index] = np.nan if _is_missing(text) else float(text)
             elif text.isascii() and "_" not in text:
                 numbers[index] = float(text.strip() or "nan")
             else:
@@ -161,11 +170,19 @@ def _parsed(source: str, header: str, cells: np.ndarray, first_row: int) -> np.n
     return numbers
 
 
+def _is_missing(cell: Any) -> bool:
+    import pandas
+
+    return cell is None or cell is pandas.NA
+
+
 def _listed(dimensions: tuple[Hashable, ...]) -> str:
     return " and ".join(map(repr, dimensions)) or "nothing"
 
 
 def _of_series(series: Any) -> np.ndarray:
+    import pandas
+
     if pandas.api.types.is_extension_array_dtype(series.dtype) and pandas.api.types.is_numeric_dtype(series.dtype):
         return series.to_numpy(np.float64, na_value=np.nan)
     if isinstance(series.dtype, pandas.DatetimeTZDtype):

@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import h5py
 import numpy as np
-import xarray
 
 from jaxsub.findings import Finding
 from jaxsub.recording.bounds import require_plausible
@@ -14,11 +13,16 @@ from jaxsub.recording.frames import variables
 from jaxsub.recording.reading import Contents, note, reading
 from jaxsub.units import TIME, split_header
 
+if TYPE_CHECKING:
+    import xarray
+
 _CLASSIC = b"CDF"
 
 
 def read_netcdf(path: Path, source: str) -> Contents:
     """The variables along the dimension of `t`, with a note of each that has masked samples."""
+    import xarray
+
     with reading(source, "NetCDF"):
         engine = _checked(path, source)
         # xarray's own masking would not count, and does not know valid_min
@@ -53,7 +57,7 @@ def _checked(path: Path, source: str) -> Literal["scipy", "h5netcdf"]:
     return "h5netcdf"
 
 
-def _decoded(source: str, name: str, variable: xarray.Variable) -> tuple[np.ndarray, list[Finding]]:
+def _decoded(source: str, name: str, variable: "xarray.Variable") -> tuple[np.ndarray, list[Finding]]:
     """The samples unpacked, NaN where the file's attributes say that there is none, and a note of each such reason."""
     raw = variable.to_numpy()
     if raw.dtype.kind not in "iuf":

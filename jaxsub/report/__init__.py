@@ -1,9 +1,28 @@
 """The report: figures, tables and one self-contained page that shows a diagnosis; the only room that draws."""
 
-from .checked_runs import draw_checked_runs
-from .drawing import Picture
-from .figures import draw
-from .page import write_report
-from .sweeps import sweep_pictures
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .checked_runs import draw_checked_runs
+    from .drawing import Picture
+    from .figures import draw
+    from .page import write_report
+    from .sweeps import sweep_pictures
 
 __all__ = ["Picture", "draw", "draw_checked_runs", "sweep_pictures", "write_report"]
+
+_MODULES = {
+    "Picture": "drawing",
+    "draw": "figures",
+    "draw_checked_runs": "checked_runs",
+    "sweep_pictures": "sweeps",
+    "write_report": "page",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, imported when it is asked for: commands that draw nothing need no Matplotlib."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f".{_MODULES[name]}", __name__), name)

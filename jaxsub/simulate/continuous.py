@@ -1,8 +1,7 @@
 """The continuous model between the samples of recordings: the reference for the sampled step, and a source of truth."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,6 +11,9 @@ from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import stack
 from .sampled import parabola
+
+if TYPE_CHECKING:
+    import diffrax
 
 
 class _Interval(eqx.Module):
@@ -39,7 +41,7 @@ def integrate(
     *,
     rtol: float = 1e-9,
     atol: float = 1e-9,
-    adjoint: diffrax.AbstractAdjoint = diffrax.ForwardMode(),
+    adjoint: "diffrax.AbstractAdjoint | None" = None,
 ) -> Float[Array, "r k s"]:
     r"""States at the samples of `runs` of $\tilde M\dot\nu = \tilde A\nu + \tau$ from the initial states `start`.
 
@@ -49,10 +51,14 @@ def integrate(
     at its start, middle and end; `runs.substeps` plays no part. A run that diverges becomes NaN there and stays so,
     without an exception.
 
-    The default `adjoint` gives `jax.jvp` and `jax.jacfwd`; for `jax.grad` pass `diffrax.RecursiveCheckpointAdjoint()`.
+    The default `adjoint`, forward mode, gives `jax.jvp` and `jax.jacfwd`; for `jax.grad` pass
+    `diffrax.RecursiveCheckpointAdjoint()`.
 
     Source: Tsitouras (2011), Comput. Math. Appl. 62; Kidger (2021), On Neural Differential Equations.
     """
+    # imported here, since only this needs it and it takes long
+    import diffrax
+
     inverse = jnp.linalg.inv(vehicle.mass_matrix())
     nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
     controller = diffrax.PIDController(rtol=rtol, atol=atol)
@@ -70,7 +76,7 @@ def integrate(
             y0=state,
             args=_Interval(vehicle, inverse, node, length),
             stepsize_controller=controller,
-            adjoint=adjoint,
+            adjoint=diffrax.ForwardMode() if adjoint is None else adjoint,
             throw=False,
         )
         # where it gave up, diffrax returns how far it came: a state of an earlier time

@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
 from ...findings import Finding
@@ -121,6 +120,8 @@ def _attitude(log: Log, path: Path, name: str) -> dict[str, Series]:
         if len(found) == len(form):
             parts = np.stack([found[part].values for part in form], axis=1)
             good = np.isfinite(parts).all(axis=1) & (np.abs(parts) > 0.0).any(axis=1)
+            from scipy.spatial.transform import Rotation
+
             angles = Rotation.from_quat(parts[good]).as_euler("ZYX")
             angles[:, 0] = np.unwrap(angles[:, 0])
             return {axis: Series(found[form[0]].times[good], angles[:, i], "rad") for i, axis in enumerate(_AXES)}
