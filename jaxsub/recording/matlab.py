@@ -1,9 +1,9 @@
 """Recordings as MATLAB files (.mat), of version 4 to 7 and, as HDF5, 7.3, read by pymatreader."""
 
+import pickle
 import struct
 import subprocess
 import sys
-import warnings
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -21,6 +21,14 @@ from jaxsub.units import TIME
 _HEADER = 128  # bytes
 _COMPRESSED = 15  # MAT-File Format, table 1-1
 _PIECE = 2**20
+# warnings are about classes that it cannot read; they are refused when they are used
+_READ = """
+import pickle, sys, warnings
+warnings.simplefilter("ignore")
+import pymatreader
+found = pymatreader.read_mat(sys.argv[1])
+pickle.dump(found, sys.stdout.buffer, protocol=5)
+"""
 _ONE_NUMBER = "give one number a sample or leave the variable out"
 
 
@@ -29,13 +37,10 @@ def read_matlab(path: Path, source: str) -> Contents:
 
     A field or variable `units`, itself a struct, may state the unit of each array: `units.r = 'deg/s'`.
     """
-    reader = optional("pymatreader", "files", source)
+    optional("pymatreader", "files", source)
     with reading(source, "a MATLAB file"):
         _check(path, source)
-        _require_loadable(path, source)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about classes that it cannot read; they are refused when asked for
-            found = reader.read_mat(path)
+        found = _read_apart(path)
         tables = dict(_tables({name: value for name, value in found.items() if not name.startswith("__")}))
         if len(tables) > 1:
             listed = ", ".join(name or "the file itself" for name in tables)
@@ -47,15 +52,16 @@ def read_matlab(path: Path, source: str) -> Contents:
         return Contents(_columns(source, values), tuple(notes))
 
 
-def _require_loadable(path: Path, source: str) -> None:
-    """Raise InputError where SciPy's reader of versions 4 to 7 ends its process, as it does on some damaged files."""
-    if h5py.is_hdf5(path):
-        return
-    trial = "import sys, scipy.io; scipy.io.loadmat(sys.argv[1])"
-    done = subprocess.run([sys.executable, "-c", trial, str(path.absolute())], capture_output=True)
-    if done.returncode < 0:
-        what = f"ends the reader of MATLAB files (signal {-done.returncode})"
-        raise InputError(source, what, "check that it is whole, or save it anew")
+def _read_apart(path: Path) -> dict[str, Any]:
+    """The file's variables, read in a process of its own, since some damaged files end the one that SciPy reads in.
+
+    Raises ValueError with the last line of what that process said where it fails.
+    """
+    done = subprocess.run([sys.executable, "-c", _READ, str(path.absolute())], capture_output=True)
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise ValueError(said[-1] if done.returncode > 0 and said else "the reader of MATLAB files breaks off")
+    return pickle.loads(done.stdout)
 
 
 def _check(path: Path, source: str) -> None:
