@@ -20,11 +20,11 @@ def tones(
     Those of the highest peaks of $|\\sum_r F_r(\\omega)|^2$ over its running median, F the Fourier transform by each
     run's own time.
     """
+    from scipy import ndimage, signal
+
     longest = float(np.max(times[live], initial=0.0))
     interval = float(np.median(np.diff(times, axis=1)[live[:, 1:]]))
     grid = np.arange(0.0, longest + 0.5 * interval, interval)
-    from scipy import ndimage, signal
-
     size = fft.next_fast_len(_LINES * len(grid), real=True) or 0
     whole = np.zeros((size // 2 + 1, force.shape[-1]), complex)
     for t, values, there in zip(times, force, live, strict=True):

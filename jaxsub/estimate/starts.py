@@ -58,7 +58,6 @@ class Rate:
     @property
     def interval(self) -> tuple[float, float]:
         """Lower and upper end."""
-        # imported here, since it takes longer than a fit of few samples
         from scipy import stats
 
         ends = stats.binomtest(self.successes, self.count).proportion_ci(method="wilson")

@@ -11,7 +11,7 @@ from jaxsub.findings import Finding
 from jaxsub.recording.recording import FIRST_ROW, Recording, check_column
 from jaxsub.units import TIME, column_to_si, split_header
 
-# imported where they are used: together they take longer than most files
+# imported where they are used, so that commands that need neither start sooner
 if TYPE_CHECKING:
     import pandas
     import xarray
