@@ -1,14 +1,15 @@
 """Vehicles and recordings that tests in several rooms start from."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from jaxsub.effects import Facts, candidates, with_numbers
-from jaxsub.recording import Recording
+from jaxsub.recording import Recording, save
 from jaxsub.recording.runs import Runs, stack_runs
 from jaxsub.simulate import prbs, synthetic
-from jaxsub.vehicle import AbstractVehicle, Mechanism, vehicle_from
+from jaxsub.vehicle import AbstractVehicle, Mechanism, vehicle_from, write_vehicle
 
 # one over what is a usual size, where others are of the order of a hundredth
 _SMALL = {"hull-compressibility": 3e9, "thermal-expansion": 3e4, "density-stratification": 3e4}
@@ -49,6 +50,14 @@ def oscillator(**changes: Any) -> Mechanism:
     vehicle = vehicle_from(data | changes, "oscillator.toml")
     assert isinstance(vehicle, Mechanism)
     return vehicle
+
+
+def write_rig(folder: Path, samples: int = 120) -> None:
+    """Write `vehicle.toml`, the oscillator, and `run.csv`, a recording of it."""
+    vehicle = oscillator()
+    inputs = driven(vehicle, 0.1 * np.arange(samples), seed=1, amplitude=1.0)
+    save(synthetic(vehicle, [inputs], seed=1)[0], folder / "run.csv")
+    write_vehicle(vehicle, folder / "vehicle.toml")
 
 
 def coupled() -> Mechanism:

@@ -1,13 +1,9 @@
 """The mistakes that a new user most likely makes end every command in one line that says where, what and what to do."""
 
-import numpy as np
 import pytest
-from rigs import driven, oscillator
+from rigs import write_rig
 
 from jaxsub.cli import main
-from jaxsub.recording import save
-from jaxsub.simulate import synthetic
-from jaxsub.vehicle import vehicle_text
 
 COMMANDS = ("check", "identify", "diagnose", "simulate", "sweep")
 
@@ -16,10 +12,7 @@ COMMANDS = ("check", "identify", "diagnose", "simulate", "sweep")
 def rig(tmp_path_factory):
     """A folder with a vehicle file and a recording that are in order."""
     folder = tmp_path_factory.mktemp("rig")
-    vehicle = oscillator()
-    (run,) = synthetic(vehicle, [driven(vehicle, 0.1 * np.arange(60), seed=1, amplitude=1.0)], seed=1)
-    (folder / "vehicle.toml").write_text(vehicle_text(vehicle), encoding="utf-8")
-    save(run, folder / "run.csv")
+    write_rig(folder, samples=60)
     return folder
 
 

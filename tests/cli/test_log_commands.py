@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from commands import ran
 
-from jaxsub.cli import main
 from jaxsub.recording import load
 
 pytest.importorskip("mcap")
@@ -56,16 +56,6 @@ def folder(tmp_path_factory):
     (folder / "rig.toml").write_text(VEHICLE, encoding="utf-8")
     (folder / "map.toml").write_text(COLUMNS, encoding="utf-8")
     return folder
-
-
-def ran(monkeypatch, capsys, *arguments):
-    monkeypatch.setattr("sys.argv", ["jaxsub", *map(str, arguments)])
-    try:
-        main()
-        code = 0
-    except SystemExit as stop:
-        code = stop.code
-    return code, capsys.readouterr()
 
 
 def test_channels_are_listed(folder, monkeypatch, capsys):

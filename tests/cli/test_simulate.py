@@ -6,10 +6,10 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from commands import ran
 from rigs import driven, oscillator
 from scipy.integrate import solve_ivp
 
-from jaxsub.cli import main
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.show import hold
 from jaxsub.estimate import fit
@@ -43,19 +43,13 @@ def rewrite(folder, change):
     return folder / "changed.csv"
 
 
-def ran(monkeypatch, capsys, folder, *options, run="run.csv"):
-    arguments = [folder / "vehicle.toml", folder / run, "--out", folder / "answer.csv", *options]
-    monkeypatch.setattr("sys.argv", ["jaxsub", "simulate", *map(str, arguments)])
-    try:
-        main()
-        code = 0
-    except SystemExit as stop:
-        code = stop.code
-    return code, capsys.readouterr()
+def simulated(monkeypatch, capsys, folder, *options, run="run.csv"):
+    files = [folder / "vehicle.toml", folder / run, "--out", folder / "answer.csv"]
+    return ran(monkeypatch, capsys, "simulate", *files, *options)
 
 
 def told(monkeypatch, capsys, folder, *options, **others):
-    code, said = ran(monkeypatch, capsys, folder, "--json", *options, **others)
+    code, said = simulated(monkeypatch, capsys, folder, "--json", *options, **others)
     assert code == 0, said.err
     return json.loads(said.out)
 
@@ -107,7 +101,7 @@ def test_estimated_is_the_default_and_errs_least(rig, monkeypatch, capsys):
 
 
 def test_the_table_and_the_start_are_on_standard_output(rig, monkeypatch, capsys):
-    code, said = ran(monkeypatch, capsys, rig)
+    code, said = simulated(monkeypatch, capsys, rig)
     assert code == 0
     assert "starts from the initial state estimated from the whole recording: x_rate " in said.out
     (line,) = [line for line in said.out.splitlines() if "│ x_rate" in line]
@@ -116,7 +110,7 @@ def test_the_table_and_the_start_are_on_standard_output(rig, monkeypatch, capsys
 
 def test_a_run_without_outputs_starts_at_rest_and_says_so(rig, monkeypatch, capsys):
     rewrite(rig, lambda columns: {"f": columns["f"]})
-    code, said = ran(monkeypatch, capsys, rig, run="changed.csv")
+    code, said = simulated(monkeypatch, capsys, rig, run="changed.csv")
     assert code == 0 and "starts at rest" in said.out
     assert "no sample of x, x_rate" in said.err
     found = told(monkeypatch, capsys, rig, "--overwrite", run="changed.csv")
@@ -140,7 +134,7 @@ def late(columns):
 def test_a_sensor_that_starts_late_says_nothing_of_the_start(rig, monkeypatch, capsys):
     """Claim: its first value is refused as a recorded start, and an estimated one is right without it."""
     rewrite(rig, late)
-    code, said = ran(monkeypatch, capsys, rig, "--start", "recorded", run="changed.csv")
+    code, said = simulated(monkeypatch, capsys, rig, "--start", "recorded", run="changed.csv")
     assert code == 2 and "x has its first sample at 3 s" in said.err and "--start estimated" in said.err
     assert not (rig / "answer.csv").exists()
     found = told(monkeypatch, capsys, rig, run="changed.csv")
@@ -152,7 +146,7 @@ def test_noise_that_nobody_states_has_no_ratio(rig, monkeypatch, capsys):
     (rig / "vehicle.toml").write_text(text, encoding="utf-8")
     found = told(monkeypatch, capsys, rig)["fit"]["x_rate"]
     assert found["sigma"] is None and found["rms_over_sigma"] is None and found["rms"] > 0.0
-    assert "not stated" in ran(monkeypatch, capsys, rig, "--overwrite")[1].out
+    assert "not stated" in simulated(monkeypatch, capsys, rig, "--overwrite")[1].out
 
 
 def test_a_channel_that_cannot_be_used_is_no_missing_one(rig, monkeypatch, capsys):
@@ -161,13 +155,13 @@ def test_a_channel_that_cannot_be_used_is_no_missing_one(rig, monkeypatch, capsy
     column = header.index("x")
     broken = [",".join("on" if i == column else cell for i, cell in enumerate(row.split(","))) for row in lines[1:]]
     (rig / "run.csv").write_text("\n".join([lines[0], *broken]), encoding="utf-8")
-    code, said = ran(monkeypatch, capsys, rig)
+    code, said = simulated(monkeypatch, capsys, rig)
     assert code == 2 and "'x'" in said.err
 
 
 def test_a_model_that_diverges_is_one_line_and_writes_nothing(rig, monkeypatch, capsys):
     text = (rig / "vehicle.toml").read_text(encoding="utf-8").replace("0.6", "-600.0")
     (rig / "vehicle.toml").write_text(text, encoding="utf-8")
-    code, said = ran(monkeypatch, capsys, rig)
+    code, said = simulated(monkeypatch, capsys, rig)
     assert code == 2 and "diverges" in said.err and said.out == ""
     assert not (rig / "answer.csv").exists()

@@ -6,23 +6,15 @@ import subprocess
 import sys
 import time
 
-import numpy as np
 import pytest
-from rigs import driven, oscillator
+from rigs import write_rig
 from trees import ROOT, tree, write
-
-from jaxsub.recording import save
-from jaxsub.simulate import synthetic
-from jaxsub.vehicle import write_vehicle
 
 
 @pytest.fixture
 def begun(tmp_path):
     """`jaxsub identify`, begun in a folder and at work, and what was in the folder."""
-    vehicle = oscillator()
-    inputs = driven(vehicle, 0.1 * np.arange(120), seed=1, amplitude=1.0)
-    save(synthetic(vehicle, [inputs], seed=1)[0], tmp_path / "run.csv")
-    write_vehicle(vehicle, tmp_path / "vehicle.toml")
+    write_rig(tmp_path)
     before = tree(tmp_path)
     process = identify(tmp_path)
     while not list(tmp_path.glob(".jaxsub-*")) and process.poll() is None:

@@ -5,15 +5,13 @@ import subprocess
 
 import numpy as np
 import pytest
-from rigs import driven, oscillator
+from rigs import write_rig
 from trees import tree
 
 from jaxsub.cli import main
 from jaxsub.cli.output import fresh_file, fresh_folder
 from jaxsub.errors import InputError, OutputError
 from jaxsub.recording import Recording, save
-from jaxsub.simulate import synthetic
-from jaxsub.vehicle import write_vehicle
 
 
 def mounted(folder, *options):
@@ -38,10 +36,7 @@ def disk(tmp_path):
 @pytest.fixture
 def rig(tmp_path):
     """A vehicle file and a recording of it."""
-    vehicle = oscillator()
-    inputs = driven(vehicle, 0.1 * np.arange(120), seed=1, amplitude=1.0)
-    save(synthetic(vehicle, [inputs], seed=1)[0], tmp_path / "run.csv")
-    write_vehicle(vehicle, tmp_path / "vehicle.toml")
+    write_rig(tmp_path)
     return [str(tmp_path / "vehicle.toml"), str(tmp_path / "run.csv")]
 
 
