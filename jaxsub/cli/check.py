@@ -51,7 +51,7 @@ def run(
     if out is not None:
         with fresh_folder(out, overwrite, inputs) as folder, terminal.progress("drawing"):
             _write(vehicle, [*recordings, *held], checked, content, folder)
-    terminal.emit(content, lambda: _show(vehicle, checked))
+    terminal.emit(content, lambda: _show(content, checked))
     terminal.count(checked.findings)
     if checked.errors:
         sys.exit(2)
@@ -68,7 +68,13 @@ def _read(path: Path, vehicle: AbstractVehicle, columns: Path | None, unread: li
 def _content(vehicle: AbstractVehicle, checked: Checked) -> dict[str, Any]:
     every = [*checked.recordings, *checked.held_out]
     channels = [
-        {"run": recording.source, "channel": channel.name, "role": channel.role, **_numbers(recording, channel)}
+        {
+            "run": recording.source,
+            "name": recording.name,  # the pieces of a run that was cut have one source
+            "channel": channel.name,
+            "role": channel.role,
+            **_numbers(recording, channel),
+        }
         for recording in every
         for channel in channels_of(vehicle.layout)
         if channel.name in recording.columns
@@ -105,27 +111,23 @@ def _write(
         (folder / "figures" / f"{picture.name}.png").write_bytes(picture.png)
 
 
-def _show(vehicle: AbstractVehicle, checked: Checked) -> None:
-    rows = []
-    for recording in (*checked.recordings, *checked.held_out):
-        for channel in channels_of(vehicle.layout):
-            if channel.name not in recording.columns:
-                continue
-            told = _numbers(recording, channel)
-            span = f"{told['least']:.4g} to {told['largest']:.4g}" if told["samples"] else "none"
-            found = {f.check for f in checked.findings if f.where == recording.source and f.channel == channel.name}
-            counts = (str(told["samples"]), str(told["missing"]))
-            rows.append(
-                (recording.name, channel.name, channel.role, *counts, span, channel.unit, ", ".join(sorted(found)))
-            )
+def _show(content: dict[str, Any], checked: Checked) -> None:
+    rows = [_channel_row(channel, checked) for channel in content["channels"]]
     if rows:
         terminal.table(("run", "channel", "role", "samples", "missing", "range", "unit", "found"), rows)
     listed = [_row(finding) for finding in checked.findings]
     if listed:
         terminal.table(("severity", "check", "where", "channel", "rows", "times (s)", "what"), listed)
-    errors, total = len(checked.errors), len(checked.findings)
-    warnings = sum(finding.severity == "warning" for finding in checked.findings)
-    terminal.say(f"{errors} errors, {warnings} warnings, {total - errors - warnings} notes")
+    errors, warnings = content["errors"], content["warnings"]
+    terminal.say(f"{errors} errors, {warnings} warnings, {len(checked.findings) - errors - warnings} notes")
+
+
+def _channel_row(channel: dict[str, Any], checked: Checked) -> tuple[str, ...]:
+    name, where = channel["channel"], channel["run"]
+    span = f"{channel['least']:.4g} to {channel['largest']:.4g}" if channel["samples"] else "none"
+    found = sorted({finding.check for finding in checked.findings if (finding.where, finding.channel) == (where, name)})
+    counts = (str(channel["samples"]), str(channel["missing"]))
+    return (channel["name"], name, channel["role"], *counts, span, channel["unit"], ", ".join(found))
 
 
 def _row(finding: Finding) -> tuple[str, ...]:

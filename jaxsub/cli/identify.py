@@ -1,11 +1,11 @@
 """`jaxsub identify`: coefficients with standard errors, whether they explain the runs, and what the runs leave open."""
 
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 
 from ..discrepancy import batch
@@ -19,9 +19,6 @@ from .effort import Effort, return_memory
 from .identification import Identification
 from .output import fresh_folder, paths_of
 from .runs import load_runs
-
-# the shell's exit code of a command that SIGINT ended
-_INTERRUPTED = 130
 
 
 def run(
@@ -62,8 +59,7 @@ def run(
                 told("drawing from the posterior")
                 _write_posterior(posterior(found), folder / "posterior.nc")
     if not identified.complete:
-        terminal.console.print(f"jaxsub: interrupted after the fit; {out} holds the fit and what followed it so far")
-        sys.exit(_INTERRUPTED)
+        raise click.Abort(f"interrupted after the fit; {out} holds the fit and what followed it so far")
 
 
 def _write_posterior(drawn: Any, path: Path) -> None:

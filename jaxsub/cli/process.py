@@ -1,6 +1,5 @@
 """The command as a process: exit codes, signals, and one line for each way in which it ends early."""
 
-import difflib
 import os
 import signal
 import sys
@@ -10,7 +9,7 @@ from typing import Any, NoReturn
 
 import click
 
-from ..errors import InputError, OutputError
+from ..errors import InputError, OutputError, nearest
 from .options import Options
 
 _LONGEST_NAME, _LONGEST_PATH, _LONGEST_MESSAGE = 255, 4095, 500
@@ -54,8 +53,8 @@ class Commands(click.Group):
         """
         name = args[0]
         if self.get_command(ctx, name) is None and not name.startswith("-"):
-            near = difflib.get_close_matches(name, self.list_commands(ctx), 1)
-            ctx.fail(f"no command {name!r}" + (f"; did you mean {near[0]!r}?" if near else ""))
+            near = nearest(name, self.list_commands(ctx))
+            ctx.fail(f"no command {name!r}" + (f"; did you mean {near!r}?" if near else ""))
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:

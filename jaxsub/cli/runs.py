@@ -33,11 +33,6 @@ def load_train_and_test(
     return list(checked.recordings), list(checked.held_out)
 
 
-def load_checked_run(path: Path, vehicle: AbstractVehicle, columns: Path | None = None) -> Recording:
-    """The recording at `path`, checked, in one piece. Raises InputError where a hole in time cuts it."""
-    return checked_run(load_run(path, vehicle, columns), vehicle)
-
-
 def checked_run(recording: Recording, vehicle: AbstractVehicle) -> Recording:
     """The recording, checked, in one piece. Raises InputError where a hole in time cuts it."""
     checked = check(vehicle, [recording])

@@ -133,14 +133,12 @@ def make_plan(asked: Asked) -> Plan:
         load_runs(asked.runs, other)
     if len({recording.name for recording in recordings}) < len(recordings):
         raise InputError(", ".join(map(str, asked.runs)), "two runs have one name", "rename one of the files")
-    sets: dict[str, Sequence[Recording]] = {recording.name: [recording] for recording in recordings}
-    require_memory(vehicles, sets if asked.apart else {_TOGETHER: recordings}, asked.starts, asked.noise_seeds)
+    require_memory(vehicles, _sets(recordings, asked.apart), asked.starts, asked.noise_seeds)
     if asked.noise_seeds:
         recordings = answered(first, recordings)
-        sets = {recording.name: [recording] for recording in recordings}
     return Plan(
         vehicles,
-        sets if asked.apart else {_TOGETHER: recordings},
+        _sets(recordings, asked.apart),
         asked.starts,
         spread=asked.spread,
         noise=range(asked.noise_seeds),
@@ -148,6 +146,11 @@ def make_plan(asked: Asked) -> Plan:
         method=asked.method.replace("-", "_"),
         compiled=asked.compiled,
     )
+
+
+def _sets(recordings: Sequence[Recording], apart: bool) -> dict[str, Sequence[Recording]]:
+    """The recordings that are fitted together, by name."""
+    return {recording.name: [recording] for recording in recordings} if apart else {_TOGETHER: recordings}
 
 
 def _by_stem(paths: Sequence[Path], read: Any) -> Mapping[str, AbstractVehicle]:

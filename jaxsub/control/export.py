@@ -1,12 +1,9 @@
 """A plant compiled ahead of time: a file of programs, names and numbers, and beside it a loader that needs only JAX."""
 
-import contextlib
 import importlib.util
 import inspect
-import os
-import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,6 +17,7 @@ from jaxtyping import Array, Float
 from ..errors import InputError
 from ..plain import to_json
 from ..simulate import at_rest
+from ..storage import written_whole
 from . import plant_loader
 from .plant import Plant
 
@@ -69,7 +67,7 @@ def export_plant(
         "platforms": list(platforms),
     }
     shapes = [jax.ShapeDtypeStruct(np.shape(part), x.dtype) for part in (x, u, 0.0)]
-    with _replacing(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
+    with written_whole(path) as unfinished, zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("plant.json", to_json(about))
         for name, method in _programs(plant).items():
             program = export.export(jax.jit(method), platforms=list(platforms))(*shapes)
@@ -87,7 +85,7 @@ def export_plant_loader(path: Path) -> None:
     first = source.partition("\n")[0]
     if path.exists() and not (path.is_file() and path.read_bytes().startswith(first.encode())):
         raise InputError(str(path), "is there, and is no loader of plants", "give another path")
-    with _replacing(path) as unfinished:
+    with written_whole(path) as unfinished:
         unfinished.write_text(source, encoding="utf-8")
 
 
@@ -102,15 +100,6 @@ def load_plant(path: Path) -> SimpleNamespace:
         raise InputError(*error.parts) from None
     except ModuleNotFoundError as error:
         raise InputError("flatbuffers", "is not installed", "pip install 'jaxsub[control]'") from error
-
-
-@contextlib.contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to, whose file takes its place when the block ends well."""
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as folder:
-        unfinished = Path(folder) / path.name
-        yield unfinished
-        os.replace(unfinished, path)
 
 
 def _programs(plant: Plant) -> dict[str, Callable[[Array, Array, Array], Any]]:
