@@ -3,6 +3,7 @@
 import dataclasses
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from ..recording import Recording
 from ..report import draw_checked_runs
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
-from .output import fresh_folder, paths_of, require_replaceable
+from .output import fresh_folder, paths_of
 from .runs import load_run, repeated_paths
 
 
@@ -35,9 +36,23 @@ def run(
     """
     session.start()
     inputs = paths_of(vehicle_path, *runs, *held_out, columns)
-    if out is not None:
-        require_replaceable(out, overwrite, inputs)
-    vehicle = read_vehicle(vehicle_path)
+    with fresh_folder(out, overwrite, inputs) if out is not None else nullcontext() as folder:
+        vehicle = read_vehicle(vehicle_path)
+        recordings, checked = _checked(vehicle, runs, held_out, columns)
+        content = _content(vehicle, checked)
+        terminal.emit(content, lambda: _show(content, checked))
+        if folder is not None:
+            with terminal.progress("drawing"):
+                _write(vehicle, recordings, checked, content, folder)
+    terminal.count(checked.findings)
+    if checked.errors:
+        sys.exit(2)
+
+
+def _checked(
+    vehicle: AbstractVehicle, runs: Sequence[Path], held_out: Sequence[Path], columns: Path | None
+) -> tuple[list[Recording], Checked]:
+    """The recordings that can be read, as they are in their files, and what checks find in them."""
     unread: list[Finding] = repeated_paths(runs, held_out)
     read = [_read(path, vehicle, columns, unread) for path in runs]
     unseen = [_read(path, vehicle, columns, unread) for path in held_out]
@@ -46,15 +61,7 @@ def run(
     # a file given twice is one finding, not also the equal samples that follow from it
     known = {finding.where for finding in unread}
     later = [finding for finding in checked.findings if finding.check != "same-run" or finding.where not in known]
-    checked = dataclasses.replace(checked, findings=(*unread, *later))
-    content = _content(vehicle, checked)
-    if out is not None:
-        with fresh_folder(out, overwrite, inputs) as folder, terminal.progress("drawing"):
-            _write(vehicle, [*recordings, *held], checked, content, folder)
-    terminal.emit(content, lambda: _show(content, checked))
-    terminal.count(checked.findings)
-    if checked.errors:
-        sys.exit(2)
+    return [*recordings, *held], dataclasses.replace(checked, findings=(*unread, *later))
 
 
 def _read(path: Path, vehicle: AbstractVehicle, columns: Path | None, unread: list[Finding]) -> Recording | None:

@@ -18,7 +18,7 @@ from ..report import write_report
 from ..report.text import measurement, percent, ratio, unit
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
 from . import session, terminal
-from .output import fresh_folder, paths_of, require_replaceable
+from .output import fresh_folder, paths_of
 from .runs import load_train_and_test
 
 _NEXT = "next_manoeuvre.csv"
@@ -40,14 +40,12 @@ def run(
     `columns` says what to take.
     """
     session.start()
-    inputs = paths_of(vehicle_path, *runs, *held, script, columns)
-    require_replaceable(out, overwrite, inputs)
-    own = () if script is None else from_script(script)
-    vehicle = read_vehicle(vehicle_path, own)
-    require_free(vehicle, str(vehicle_path))
-    recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
-    train, judged = (recordings, unseen) if held else hold_out(recordings)
-    with fresh_folder(out, overwrite, inputs) as folder:
+    with fresh_folder(out, overwrite, paths_of(vehicle_path, *runs, *held, script, columns)) as folder:
+        own = () if script is None else from_script(script)
+        vehicle = read_vehicle(vehicle_path, own)
+        require_free(vehicle, str(vehicle_path))
+        recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
+        train, judged = (recordings, unseen) if held else hold_out(recordings)
         answer = diagnosed(vehicle, train, judged, (*vocabulary(), *own), manoeuvre)
         # shown before it is written: where writing fails, minutes of work are not lost
         answer.emit()

@@ -19,7 +19,7 @@ from ..report.text import unit
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_findings
 from . import session, terminal
-from .output import fresh_file, paths_of, require_replaceable
+from .output import fresh_file, paths_of
 from .runs import checked_run, load_run
 
 Start = Literal["rest", "recorded", "estimated"]
@@ -39,16 +39,26 @@ def run(
     most probable, as `diagnose` and `identify` estimate it. Of a log, the file at `columns` says what to take.
     """
     session.start()
-    inputs = paths_of(vehicle_path, run_path, columns)
-    require_replaceable(out, overwrite, inputs)
-    vehicle = read_vehicle(vehicle_path)
-    recording = checked_run(with_every_channel(load_run(run_path, vehicle, columns), vehicle), vehicle)
+    with fresh_file(out, overwrite, paths_of(vehicle_path, run_path, columns)) as path:
+        vehicle = read_vehicle(vehicle_path)
+        recording = checked_run(with_every_channel(load_run(run_path, vehicle, columns), vehicle), vehicle)
+        shown = simulated(vehicle, recording, start, str(vehicle_path), out)
+        save(answer(vehicle, recording, shown, out), path)
+
+
+def simulated(
+    vehicle: AbstractVehicle, recording: Recording, start: Start, where: str, out: Path
+) -> Float[np.ndarray, "k c"]:
+    """The outputs of the vehicle read from `where`, in SI units; shows their errors and what is to be said of them.
+
+    **Raises** `InputError` where the model diverges, and as `initial_state` does.
+    """
     with terminal.progress(f"simulating {vehicle.layout.name}"):
         runs = batch(vehicle, [recording])
         began, state, findings = initial_state(vehicle, runs, recording, start)
         shown = predict(vehicle, runs, state[None])
     if not np.all(np.isfinite(np.asarray(shown))):
-        raise InputError(str(vehicle_path), "the model diverges on these inputs", "check the coefficients' signs")
+        raise InputError(where, "the model diverges on these inputs", "check the coefficients' signs")
     known = vehicle_findings(vehicle, vehicle.layout.name)
     fit, assessment = errors(vehicle, runs, shown)
     findings += unexplained(assessment, recording.source)
@@ -65,8 +75,7 @@ def run(
         "warnings": [finding.to_json() for finding in (*known, *recording.findings, *findings)],
     }
     terminal.emit(content, lambda: show(began, content["initial_state"], fit))
-    with fresh_file(out, overwrite, inputs) as path:
-        save(answer(vehicle, recording, np.asarray(shown)[0], out), path)
+    return np.asarray(shown)[0]
 
 
 def with_every_channel(recording: Recording, vehicle: AbstractVehicle) -> Recording:

@@ -1,10 +1,8 @@
 """A sweep small enough for tests: an oscillator, two short recordings, six chunks."""
 
 import functools
-import os
 from pathlib import Path
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from rigs import driven, oscillator
@@ -43,15 +41,6 @@ def files(folder: Path) -> list[str]:
     write_vehicle(vehicle(), folder / "vehicle.toml")
     save(recordings()[0], folder / "run.csv")
     return ["sweep", *(str(folder / name) for name in ("vehicle.toml", "run.csv")), "--out", str(folder / "out")]
-
-
-def environment(cache: Path, **more: str) -> dict[str, str]:
-    """For processes of their own: they find this checkout, and the command keeps its compiled programs in `cache`."""
-    root, shared = str(Path(__file__).parents[2]), jax.config.jax_compilation_cache_dir
-    compiled = {"JAX_COMPILATION_CACHE_DIR": shared, "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.3"}
-    found = {"PYTHONPATH": root, "XDG_CACHE_HOME": str(cache), "JAX_PLATFORMS": "cpu"}
-    found["JAX_DISABLE_MOST_OPTIMIZATIONS"] = "1"
-    return os.environ | found | (compiled if shared else {}) | more
 
 
 def farthest(one, other):
