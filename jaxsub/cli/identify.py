@@ -2,10 +2,10 @@
 
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 
 from ..discrepancy import batch
@@ -17,6 +17,8 @@ from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
 from .effort import Effort, return_memory
 from .identification import Identification
+from .interruption import interruptible
+from .options import options
 from .output import fresh_folder, paths_of
 from .runs import load_runs
 
@@ -59,7 +61,8 @@ def run(
                 told("drawing from the posterior")
                 _write_posterior(posterior(found), folder / "posterior.nc")
     if not identified.complete:
-        raise click.Abort(f"interrupted after the fit; {out} holds the fit and what followed it so far")
+        options().kept = f"{out} holds the fit, and what followed it so far"
+        raise KeyboardInterrupt
 
 
 def _write_posterior(drawn: Any, path: Path) -> None:
@@ -83,12 +86,11 @@ def _fitted(vehicle: AbstractVehicle, runs: Runs, method: str, where: str) -> Fi
 def _identified(found: Fit, method: str, where: str) -> Identification:
     """The fit and what follows from it, as far as it came before an interruption."""
     assessment, said, coloured, complete = assess(found), None, None, False
-    try:
-        coloured = coloured_covariance(found)
-        said = identifiability(found, assessment)
+    watch = options().watch
+    with suppress(KeyboardInterrupt):
+        coloured = interruptible(lambda: coloured_covariance(found), watch)
+        said = interruptible(lambda: identifiability(found, assessment), watch)
         complete = True
-    except KeyboardInterrupt:
-        pass
     return Identification(found, method, where, assessment, said, coloured, complete)
 
 

@@ -6,6 +6,8 @@ from typing import Any
 
 import click
 
+from .interruption import Watch
+
 
 @dataclasses.dataclass
 class Options:
@@ -18,6 +20,8 @@ class Options:
     - `debug`: an unexpected error shows its traceback.
     - `strict`: the command ends with exit code 3 when a warning was given.
     - `warnings`: how many warnings were given so far.
+    - `kept`: what of the command's results is on disk so far, as the message of an interruption says it.
+    - `watch`: what ends the process when it is interrupted.
     """
 
     quiet: bool = False
@@ -25,6 +29,8 @@ class Options:
     debug: bool = False
     strict: bool = False
     warnings: int = 0
+    kept: str = "nothing was written"
+    watch: Watch | None = None
 
 
 def options() -> Options:

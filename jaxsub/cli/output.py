@@ -3,7 +3,7 @@
 import errno
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import click
@@ -11,6 +11,7 @@ import click
 from ..errors import InputError, OutputError
 from ..storage import Manifest, place, scratch
 from ..storage.whole import flush
+from .options import options
 
 _ANOTHER = "choose another --out"
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.ENAMETOOLONG)
@@ -118,26 +119,16 @@ def fresh_file(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Itera
 
 @contextmanager
 def claimed(out: Path) -> Iterator[Path]:
-    """A scratch folder beside `out`, which no other process may write while the block runs.
+    """A scratch folder beside `out`, which no other process may write while the block runs (`storage.scratch`).
 
-    Its parents are made, and removed again where nothing came to be in them. **Raises** `InputError` where another
-    process writes there, and where nothing can be written.
+    **Raises** `InputError` where another process writes there, and where nothing can be written.
     """
-    at = out.absolute()
     with ExitStack() as ending:
         try:
-            for path in reversed([path for path in at.parents if not path.exists()]):
-                path.mkdir()
-                ending.callback(_remove_empty, path)
-            folder = ending.enter_context(scratch(at))
+            folder = ending.enter_context(scratch(out))
         except OSError as error:
             raise InputError(str(out), f"cannot be written ({_reason(error)})", _ANOTHER) from error
         yield folder
-
-
-def _remove_empty(folder: Path) -> None:
-    with suppress(OSError):
-        folder.rmdir()
 
 
 @contextmanager
@@ -170,6 +161,7 @@ def _put(new: Path, out: Path, folder: Path, overwrite: bool) -> None:
             where, f"{what}; it came there or changed meanwhile", f"the results are in {other}"
         ) from error
     place(new, out, folder)
+    options().kept = f"{out} is complete"
 
 
 def _command() -> str:

@@ -1,19 +1,18 @@
 """The command as a process: exit codes, signals, and one line for each way in which it ends early."""
 
 import os
-import signal
 import sys
 import traceback
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import click
 
 from ..errors import InputError, OutputError, nearest
+from .interruption import INTERRUPTED, Watch, leave
 from .options import Options
 
 _LONGEST_NAME, _LONGEST_PATH, _LONGEST_MESSAGE = 255, 4095, 500
-_INTERRUPTED = 130
 
 
 class Interrupted(Exception):
@@ -65,44 +64,53 @@ class Commands(click.Group):
         """
         try:
             return super().invoke(ctx)
-        except KeyboardInterrupt as error:
-            raise Interrupted(str(error) or "interrupted; nothing was written") from None
+        except KeyboardInterrupt:
+            raise Interrupted from None
 
 
 def run(app: click.Group) -> None:
     """Run `app` on the process's arguments.
 
     Exit codes: 0 done, 1 an unexpected error or an output that could not be written, 2 bad input, 3 warnings with
-    `--strict`, 130 interrupted.
+    `--strict`, 130 interrupted by Ctrl-C or SIGTERM, as a batch system sends it.
     """
     options = Options()
-    # a batch system's SIGTERM ends a command as Ctrl-C does, so that what it began is cleared away
-    signal.signal(signal.SIGTERM, _interrupt)
+    with Watch(lambda: _line(_interruption(options))) as options.watch:
+        code, message = _ended(app, options)
+        if message:
+            print(_line(message), file=sys.stderr)
+        if code:
+            leave(code)
+
+
+def _ended(app: click.Group, options: Options) -> tuple[int, str]:
+    """How a run of `app` ended: its exit code and, unless it is 0, what there is to say."""
     try:
         app(standalone_mode=False, prog_name="jaxsub", obj=options)
         sys.stdout.flush()
     except InputError as error:
-        _stop(str(error), 1 if isinstance(error, OutputError) else 2)
+        return 1 if isinstance(error, OutputError) else 2, str(error)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "jaxsub"
-        _stop(f"{_short(error.format_message())}; see {command} --help", 2)
-    except (Interrupted, KeyboardInterrupt, click.Abort) as error:
-        _stop(str(error) or "interrupted; nothing was written", _INTERRUPTED)
+        return 2, f"{_short(error.format_message())}; see {command} --help"
+    except (Interrupted, KeyboardInterrupt, click.Abort):
+        return INTERRUPTED, _interruption(options)
     except BrokenPipeError:
         # the reader has what it wants; Python's own flush at the end would complain
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        return 1, ""
     except Exception as error:
         if options.debug:
             traceback.print_exc()
         how = "report it with the files and" if options.debug else "run it again with --debug and report"
-        _stop(f"unexpected {type(error).__name__}: {_short(str(error))}; {how} the traceback", 1)
+        return 1, f"unexpected {type(error).__name__}: {_short(str(error))}; {how} the traceback"
     if options.strict and options.warnings:
-        _stop(f"{options.warnings} warnings, and --strict allows none", 3)
+        return 3, f"{options.warnings} warnings, and --strict allows none"
+    return 0, ""
 
 
-def _interrupt(*_: Any) -> NoReturn:
-    raise KeyboardInterrupt
+def _interruption(options: Options) -> str:
+    return f"interrupted; {options.kept}"
 
 
 def _short(message: str) -> str:
@@ -110,6 +118,5 @@ def _short(message: str) -> str:
     return line if len(line) <= _LONGEST_MESSAGE else f"{line[:_LONGEST_MESSAGE]}…"
 
 
-def _stop(message: str, code: int) -> NoReturn:
-    print(f"jaxsub: {message}", file=sys.stderr)
-    sys.exit(code)
+def _line(message: str) -> str:
+    return f"jaxsub: {message}"

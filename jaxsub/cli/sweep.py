@@ -2,12 +2,11 @@
 
 import dataclasses
 import os
-import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
-import click
 import xarray
 
 from ..errors import InputError, OutputError
@@ -60,37 +59,47 @@ def run(asked: Asked, out: Path, overwrite: bool) -> None:
             require_replaceable(out, True, inputs)
         folder = out.with_name(f"{out.name}.new") if anew else out
         plan = make_plan(asked)
-        check_folder(folder, plan)
-        _require_unchanged(folder)
+        with _in_the_way(folder) if anew else nullcontext():
+            check_folder(folder, plan)
+            _require_unchanged(folder)
         if asked.cluster is not None:
             require_cluster(asked.cluster)
         summary = _swept(asked, plan, folder)
         if anew:
             _replace(out, folder, scratch, inputs)
+        options().kept = f"{out} is complete"
     if not options().json:
         terminal.say(f"{summary['done']} searches in {out}")
     terminal.count(_findings(summary))
 
 
+@contextmanager
+def _in_the_way(folder: Path) -> Iterator[None]:
+    """Errors about `folder` with the remedy for one that is to be the new sweep of another path."""
+    try:
+        yield
+    except InputError as error:
+        where, what, _ = error.parts
+        what = f"{what}; with --overwrite the new sweep is begun there"
+        raise InputError(where, what, f"move or remove {folder}, or choose another --out") from error
+
+
 def _swept(asked: Asked, plan: Plan, folder: Path) -> dict[str, Any]:
     """The summary of the sweep, shown and written to `folder`."""
-    done = [0, 0]
-    try:
-        with terminal.counted(f"sweeping {', '.join(plan.vehicles)}") as tell:
+    again = "the same command goes on"
+    options().kept = f"what is done is kept in {folder}, and {again}"
+    with terminal.counted(f"sweeping {', '.join(plan.vehicles)}") as tell:
 
-            def progress(count: int, total: int) -> None:
-                done[:] = count, total
-                tell(count, total)
+        def progress(done: int, total: int) -> None:
+            options().kept = f"{done} of {total} searches are kept in {folder}, and {again}"
+            tell(done, total)
 
-            dataset = run_sweep(plan, folder, cluster=asked.cluster, progress=progress)
-        with terminal.progress("summarising") as say:
-            say("basins and figures")
-            summary = summarised(plan, dataset)
-        terminal.emit(summary, lambda: _show_all(summary["cases"]))
-        _write(summary, dataset, folder)
-    except KeyboardInterrupt as stop:
-        kept = f"{done[0]} of {done[1]} are kept in {folder}, and the same command goes on"
-        raise click.Abort(f"interrupted; {kept if done[1] else 'nothing was computed yet'}") from stop
+        dataset = run_sweep(plan, folder, cluster=asked.cluster, progress=progress)
+    with terminal.progress("summarising") as say:
+        say("basins and figures")
+        summary = summarised(plan, dataset)
+    terminal.emit(summary, lambda: _show_all(summary["cases"]))
+    _write(summary, dataset, folder)
     return summary
 
 
@@ -111,7 +120,7 @@ def _require_unchanged(folder: Path) -> None:
 
 
 def _replace(out: Path, folder: Path, scratch: Path, inputs: Sequence[Path]) -> None:
-    """Move the new sweep to `out`, and remove the old one."""
+    """Move the new sweep to `out`, and the old one into `scratch`, with which it goes."""
     try:
         require_replaceable(out, True, inputs)
     except InputError as error:
@@ -119,7 +128,7 @@ def _replace(out: Path, folder: Path, scratch: Path, inputs: Sequence[Path]) -> 
         raise OutputError(where, what, f"the new sweep is in {folder}") from error
     place(folder, out, scratch)
     if folder.exists():
-        shutil.rmtree(folder)
+        folder.rename(scratch / folder.name)
 
 
 def make_plan(asked: Asked) -> Plan:

@@ -11,7 +11,7 @@ import os
 import re
 import shutil
 import socket
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ..errors import InputError
@@ -26,21 +26,63 @@ _LOCK = "lock"
 _NAME = re.compile(r"\.jaxsub-(?P<key>[0-9a-f]{12})-(?P<pid>\d+)-(?P<host>[\w.-]+)")
 
 
+# the scratch folders of this process, each with the parents that were made for it, the deepest first
+_held: dict[Path, list[Path]] = {}
+
+
 @contextlib.contextmanager
 def scratch(out: Path) -> Iterator[Path]:
     """An empty folder beside `out`, held by this process and removed when the block ends.
 
-    Those that dead processes of this host left in the same parent are removed first; a result that one of them had
-    moved aside, and not yet replaced, is moved back.
+    Parents that are missing are made, and removed again where nothing came to be in them. What dead processes of this
+    host left in the same parent is removed first; a result that one of them had moved aside, and not yet replaced, is
+    moved back.
 
     **Raises** `InputError` where another process holds `out`, and `OSError` where the parent cannot be written.
     """
-    parent, key = out.absolute().parent, hashlib.sha256(out.name.encode(errors="surrogateescape")).hexdigest()[:12]
-    folder = parent / f".jaxsub-{key}-{os.getpid()}-{_host()}"
-    with _locked(parent):
-        for other in scratch_folders(parent):
+    out = out.absolute()
+    made = [path for path in out.parents if not path.exists()]
+    try:
+        for path in reversed(made):
+            path.mkdir(exist_ok=True)
+        folder = _folder(out)
+        lock = _begun(folder, out)
+        _held[folder] = made
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+            os.close(lock)
+            _held.pop(folder, None)
+    finally:
+        _remove_empty(made)
+
+
+def abandon() -> None:
+    """Remove what this process holds, for one that ends at once: none of its blocks ends any more.
+
+    Each folder is renamed first, so that what still runs can put nothing of it in place while it is removed.
+    """
+    for folder, made in list(_held.items()):
+        gone = _folder(folder)
+        with contextlib.suppress(OSError):
+            folder.rename(gone)
+            _clear(gone)
+        _remove_empty(made)
+
+
+def _folder(out: Path) -> Path:
+    """The scratch folder of `out` and this process."""
+    key = hashlib.sha256(out.name.encode(errors="surrogateescape")).hexdigest()[:12]
+    return out.parent / f".jaxsub-{key}-{os.getpid()}-{_host()}"
+
+
+def _begun(folder: Path, out: Path) -> int:
+    """Make the scratch folder of `out`; the descriptor of its file `lock`, locked."""
+    with _locked(folder.parent):
+        for other in scratch_folders(folder.parent):
             if not is_dead(other):
-                _require_other_key(other, key, out)
+                _require_other_key(other, folder, out)
             else:
                 _clear(other)
         folder.mkdir()
@@ -50,11 +92,13 @@ def scratch(out: Path) -> Iterator[Path]:
             folder.rmdir()
             raise
         _lock(lock)
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        os.close(lock)
+    return lock
+
+
+def _remove_empty(folders: Sequence[Path]) -> None:
+    for folder in folders:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
 
 
 def scratch_folders(parent: Path) -> list[Path]:
@@ -85,9 +129,9 @@ def is_dead(folder: Path) -> bool:
         os.close(lock)
 
 
-def _require_other_key(other: Path, key: str, out: Path) -> None:
-    told = _NAME.fullmatch(other.name)
-    if told is not None and told["key"] == key:
+def _require_other_key(other: Path, own: Path, out: Path) -> None:
+    told, wanted = _NAME.fullmatch(other.name), _NAME.fullmatch(own.name)
+    if told and wanted and told["key"] == wanted["key"]:
         remedy = f"wait for it or choose another --out; if it has ended, remove {other}"
         raise InputError(str(out), f"process {told['pid']} on {told['host']} is writing there", remedy)
 

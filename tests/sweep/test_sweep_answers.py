@@ -9,8 +9,9 @@ import sys
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from commands import environment
 from scipy.optimize import least_squares
-from sweep_cases import environment, farthest, plan, recordings, vehicle
+from sweep_cases import farthest, plan, recordings, vehicle
 
 from jaxsub.discrepancy import batch
 from jaxsub.errors import InputError

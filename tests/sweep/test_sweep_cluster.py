@@ -9,7 +9,8 @@ import time
 import dask
 import jax
 import pytest
-from sweep_cases import environment, farthest, plan
+from commands import environment
+from sweep_cases import farthest, plan
 
 from jaxsub.errors import InputError
 from jaxsub.sweep import sweep

@@ -9,8 +9,9 @@ import time
 
 import numpy as np
 import pytest
+from commands import environment
 from PIL import Image
-from sweep_cases import environment, farthest, files, recordings, tree
+from sweep_cases import farthest, files, recordings, tree
 
 from jaxsub.cli import main
 from jaxsub.recording import save
@@ -128,9 +129,15 @@ def test_overwrite_keeps_the_old_sweep_until_the_new_one_is_done(tmp_path, monke
     before = tree(tmp_path)
     with monkeypatch.context() as patch:
         patch.setattr("jaxsub.sweep.execute.on_this_machine", stopped)
-        _, said = command(patch, capsys, *arguments, "--starts", "4", "--overwrite")
-    assert f"0 of 4 are kept in {tmp_path / 'out'}.new" in said
+        code, said = command(patch, capsys, *arguments, "--starts", "4", "--overwrite")
+    assert code == 130
+    assert f"0 of 4 searches are kept in {tmp_path / 'out'}.new" in said
     assert before.items() <= tree(tmp_path).items()
+    begun = tree(tmp_path)
+    code, said = command(monkeypatch, capsys, *arguments, "--starts", "5", "--overwrite")
+    assert code == 2 and said.count("\n") == 1 and "add --overwrite" not in said
+    assert f"{tmp_path / 'out'}.new: holds another sweep: starts is 4 there and 5 here" in said
+    assert f"move or remove {tmp_path / 'out'}.new" in said and tree(tmp_path) == begun
     code, said = command(monkeypatch, capsys, *arguments, "--starts", "4", "--overwrite")
     assert code == 0 and open_sweep(tmp_path / "out").sizes["start"] == 4
     assert not (tmp_path / "out.new").exists() and not list(tmp_path.glob(".jaxsub-*"))
@@ -222,6 +229,6 @@ def test_an_interrupt_says_what_is_kept(tmp_path, monkeypatch, capsys):
 
     monkeypatch.setattr("jaxsub.sweep.execute.on_this_machine", stopped)
     code, said = command(monkeypatch, capsys, *files(tmp_path), "--starts", "3")
-    assert code in (1, 130)
-    assert f"0 of 3 are kept in {tmp_path / 'out'}" in said.splitlines()[-1]
+    assert code == 130
+    assert f"0 of 3 searches are kept in {tmp_path / 'out'}" in said.splitlines()[-1]
     assert os.path.exists(tmp_path / "out" / "plan.json")
