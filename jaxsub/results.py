@@ -1,5 +1,7 @@
 """What became of an estimation: optimistix's results and the failures of this field."""
 
+from typing import cast
+
 import optimistix as optx
 
 
@@ -12,5 +14,8 @@ class RESULTS(optx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
     not_stationary = "The search stopped where the gradient is not small: more steps or another start are needed."
 
 
-# to a checker of types a member is not of its enumeration, and what `promote` returns is
-SUCCESSFUL = RESULTS.promote(optx.RESULTS.successful)
+# to a checker of types a member is not of its enumeration. `promote` would run a program, which starts a backend of JAX
+# when this file is imported, before a command has said how it is to compile
+SUCCESSFUL = cast(RESULTS, RESULTS.successful)
+NONFINITE = cast(RESULTS, RESULTS.nonfinite)
+UNFINISHED = cast(RESULTS, RESULTS.nonlinear_max_steps_reached)

@@ -3,7 +3,6 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from ..filter.defaults import vehicle_filter
@@ -11,7 +10,7 @@ from ..filter.ekf import AbstractFilter
 from ..filter.mekf import ModifiedKalmanFilter
 from ..filter.passes import identify
 from ..filter.vehicle import VehicleProcess, samples
-from ..results import RESULTS, SUCCESSFUL
+from ..results import NONFINITE, RESULTS, SUCCESSFUL
 from .damped import Damped
 from .method import AbstractMethod, Found, costs, holding, in_shares, lanes_for, objective, problems
 from .pool import pool
@@ -65,6 +64,5 @@ def _filtered(method: Filtered, problem: Problem, starts: Array, outputs: Array 
         # a filter needs no initial state; the likelihood does, and the one that suits its parameters is meant
         settled = holding(of, y, jnp.zeros((len(y), p), bool))
         y = pool(Damped(Problem.expand, _SETTLED), objective, y, settled, lanes=lanes, max_steps=_STEPS).y
-    lost = RESULTS.promote(optx.RESULTS.nonfinite)
-    result = jax.vmap(lambda gone: RESULTS.where(gone, lost, SUCCESSFUL))(diverged)
+    result = jax.vmap(lambda gone: RESULTS.where(gone, NONFINITE, SUCCESSFUL))(diverged)
     return Found(y, costs(of, y, lanes), jnp.full(len(starts), method.passes), result)

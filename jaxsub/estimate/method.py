@@ -15,7 +15,7 @@ import optimistix as optx
 from jax.sharding import Mesh, PartitionSpec
 from jaxtyping import Array, Bool, Float, Int
 
-from ..results import RESULTS
+from ..results import NONFINITE, RESULTS
 from .pool import pool
 from .problem import Problem
 
@@ -126,7 +126,7 @@ def pooled(method: Iterative, problem: Problem, starts: Array, outputs: Array | 
     of, lanes = problems(problem, outputs), lanes_for(problem)
     ends = pool(method.solver, objective, starts, of, lanes=lanes, max_steps=method.max_steps)
     # without a value at the very start there is nothing that a search could have done
-    never = (ends.steps == 1) & (ends.result == RESULTS.promote(optx.RESULTS.nonfinite))
+    never = (ends.steps == 1) & (ends.result == NONFINITE)
     result = jax.vmap(lambda never, result: RESULTS.where(never, RESULTS.nan_start, result))(never, ends.result)
     return Found(ends.y, costs(of, ends.y, lanes), ends.steps, result)
 

@@ -12,10 +12,7 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Float, Int, PyTree
 
-from ..results import RESULTS, SUCCESSFUL
-
-_NONFINITE = RESULTS.promote(optx.RESULTS.nonfinite)
-_UNFINISHED = RESULTS.promote(optx.RESULTS.nonlinear_max_steps_reached)
+from ..results import NONFINITE, RESULTS, SUCCESSFUL, UNFINISHED
 
 
 class _Lane(eqx.Module):
@@ -62,9 +59,9 @@ def pool(
         y, state, _ = solver.step(with_aux, lane.y, own, {}, lane.state, frozenset())
         done, result = solver.terminate(with_aux, y, own, {}, state, frozenset())
         steps = lane.steps + 1
-        result = RESULTS.where(jnp.all(jnp.isfinite(y)), RESULTS.promote(result), _NONFINITE)
+        result = RESULTS.where(jnp.all(jnp.isfinite(y)), RESULTS.promote(result), NONFINITE)
         done = done | (result != SUCCESSFUL)
-        result = RESULTS.where(done, result, _UNFINISHED)
+        result = RESULTS.where(done, result, UNFINISHED)
         return _Lane(lane.index, y, state, steps), done | (steps >= max_steps), result
 
     def body(carry: tuple[Any, Int[Array, ""], Ends]) -> tuple[Any, Int[Array, ""], Ends]:

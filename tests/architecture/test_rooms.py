@@ -67,7 +67,7 @@ def test_file_is_short_and_says_what_it_is_for(path):
     assert ast.get_docstring(ast.parse(text))
 
 
-def test_importing_every_module_prints_nothing_and_changes_no_setting():
+def test_importing_every_module_prints_nothing_changes_no_setting_and_starts_no_backend():
     modules = sorted(
         ".".join(("jaxsub", *path.relative_to(HOUSE).with_suffix("").parts)).removesuffix(".__init__")
         for path in FILES
@@ -82,6 +82,9 @@ for name in {modules!r}:
     importlib.import_module(name)
 after = jax.config.jax_enable_x64, dict(matplotlib.rcParams), numpy.random.get_state()[1].tolist(), numpy.geterr()
 assert before == after
+# JAX refuses this once a backend has started, and a command's options of XLA have no effect after that
+jax.config.update("jax_num_cpu_devices", 2)
+assert len(jax.devices("cpu")) == 2
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=HOUSE.parent, timeout=300)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
