@@ -5,6 +5,7 @@ import glob
 import os
 import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -44,31 +45,38 @@ def _keep_programs(folder: Path) -> None:
     _repair(folder)
 
 
-def _repair(folder: Path) -> None:
-    """Remove damaged entries of the cache in `folder` when JAX meets them, and say so once.
+class _Repair:
+    """A handler of warnings that removes damaged entries of the cache in `folder` when JAX meets them.
 
     JAX warns of an entry that it cannot read, compiles, and does not write where a file is: the damage would stay. The
-    warning comes before it compiles, so a file removed at the warning is written anew by the same run.
+    warning comes before it compiles, so a file removed at the warning is written anew by the same run. It is said once;
+    `show` is what handles other warnings.
     """
-    warnings.filterwarnings("always", message=_CACHE_FAILS)
-    show, said = warnings.showwarning, set()
 
-    def repair(message: Warning | str, *where: Any, **more: Any) -> None:
+    def __init__(self, folder: Path, show: Callable[..., None]):
+        self._folder, self._said, self.show = folder, set[str](), show
+
+    def __call__(self, message: Warning | str, *where: Any, **more: Any) -> None:
         found = re.match(_CACHE_FAILS, str(message))
         if found is None:
-            show(message, *where, **more)
+            self.show(message, *where, **more)
             return
         failed, program = found.groups()
         if failed == "reading":
             # the name's other entries go too: which of them is damaged the warning does not say
-            for entry in folder.glob(f"{glob.escape(program)}-*"):
+            for entry in self._folder.glob(f"{glob.escape(program)}-*"):
                 entry.unlink(missing_ok=True)
-        if failed not in said:
-            said.add(failed)
+        if failed not in self._said:
+            self._said.add(failed)
             done = {"reading": "damaged entries are replaced", "writing": "a compiled program could not be kept"}
-            terminal.note(f"note: {folder}: {done[failed]}")
+            terminal.note(f"note: {self._folder}: {done[failed]}")
 
-    warnings.showwarning = repair
+
+def _repair(folder: Path) -> None:
+    """Have damaged entries of the cache in `folder`, and of no other, repaired from now on."""
+    warnings.filterwarnings("always", message=_CACHE_FAILS)
+    show = warnings.showwarning
+    warnings.showwarning = _Repair(folder, show.show if isinstance(show, _Repair) else show)
 
 
 def _compile_quickly() -> None:

@@ -1,4 +1,4 @@
-"""Commands set themselves up without a home and with a damaged cache of compiled programs."""
+"""Commands set themselves up, once or again, without a home and with a damaged cache of compiled programs."""
 
 import os
 import subprocess
@@ -10,7 +10,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
 from jaxsub.cli import session
-session.start()
+for _ in range({starts}):
+    session.start()
 import jax, jax.numpy as jnp
 def tripled(x):
     return 3.0 * x
@@ -18,10 +19,10 @@ print(jax.jit(tripled)(jnp.arange(3.0)))
 """
 
 
-def ran(**environment):
+def ran(starts=1, **environment):
     base = {name: value for name, value in os.environ.items() if name not in ("HOME", "XDG_CACHE_HOME", "XLA_FLAGS")}
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
+        [sys.executable, "-c", PROGRAM.format(starts=starts)],
         env=base | {"PYTHONPATH": str(ROOT), "JAX_PLATFORMS": "cpu"} | environment,
         capture_output=True,
         text=True,
@@ -50,3 +51,11 @@ def test_damaged_programs_are_replaced_with_one_note(tmp_path, damage):
     assert said.count("\n") == 1 and "damaged entries are replaced" in said
     assert all(entry.read_bytes() != before for entry, before in damaged.items())
     assert ran(XDG_CACHE_HOME=str(tmp_path)) == ""
+
+
+def test_set_up_twice_the_damage_is_said_once(tmp_path):
+    ran(XDG_CACHE_HOME=str(tmp_path))
+    for entry in tmp_path.rglob("*-cache"):
+        entry.write_bytes(b"damaged")
+    said = ran(starts=3, XDG_CACHE_HOME=str(tmp_path))
+    assert said.count("\n") == 1 and "damaged entries are replaced" in said
