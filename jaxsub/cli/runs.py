@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..checks import check
+from ..checks import Checked, check
 from ..errors import InputError
 from ..findings import Finding, require_none
 from ..recording import Recording, load, read_selection
@@ -22,15 +22,26 @@ def load_train_and_test(
 ) -> tuple[list[Recording], list[Recording]]:
     """The recordings at `paths` and those at `held_out`, masked, unwrapped and cut as `check` says.
 
-    Of logs the file at `columns` says what to take. Warnings and notes are printed. Raises InputError for the first
-    finding that is an error, and for a file that is given twice.
+    Of logs the file at `columns` says what to take. Warnings and notes are printed. Raises InputError as `checked_runs`
+    does.
+    """
+    checked = checked_runs(paths, held_out, vehicle, columns)
+    terminal.warn(checked.findings)
+    return list(checked.recordings), list(checked.held_out)
+
+
+def checked_runs(
+    paths: Sequence[Path], held_out: Sequence[Path], vehicle: AbstractVehicle, columns: Path | None = None
+) -> Checked:
+    """What `check` finds in the recordings, none of it an error.
+
+    Raises InputError for the first finding that is one, and for a file that is given twice.
     """
     require_once(paths, held_out)
     read = lambda group: [load_run(path, vehicle, columns) for path in group]
     checked = check(vehicle, read(paths), read(held_out))
     require_none(checked.findings)
-    terminal.warn(checked.findings)
-    return list(checked.recordings), list(checked.held_out)
+    return checked
 
 
 def checked_run(recording: Recording, vehicle: AbstractVehicle) -> Recording:

@@ -22,7 +22,7 @@ from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
 from .options import options
 from .output import claimed, require_apart, require_replaceable
-from .runs import load_runs
+from .runs import checked_runs
 
 _TOGETHER = "all"
 _RESULT, _FIGURES = "sweep.json", "figures"
@@ -137,9 +137,10 @@ def make_plan(asked: Asked) -> Plan:
     for path, vehicle in zip([asked.vehicle, *asked.others], vehicles.values(), strict=True):
         require_free(vehicle, str(path))
     first = next(iter(vehicles.values()))
-    recordings = load_runs(asked.runs, first)
-    for other in list(vehicles.values())[1:]:
-        load_runs(asked.runs, other)
+    checked = [checked_runs(asked.runs, (), vehicle) for vehicle in vehicles.values()]
+    # most findings are of the runs, whatever the vehicle
+    terminal.warn(dict.fromkeys(finding for each in checked for finding in each.findings))
+    recordings = list(checked[0].recordings)
     if len({recording.name for recording in recordings}) < len(recordings):
         raise InputError(", ".join(map(str, asked.runs)), "two runs have one name", "rename one of the files")
     require_memory(vehicles, _sets(recordings, asked.apart), asked.starts, asked.noise_seeds)

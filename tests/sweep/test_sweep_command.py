@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -232,3 +233,18 @@ def test_an_interrupt_says_what_is_kept(tmp_path, monkeypatch, capsys):
     assert code == 130
     assert f"0 of 3 searches are kept in {tmp_path / 'out'}" in said.splitlines()[-1]
     assert os.path.exists(tmp_path / "out" / "plan.json")
+
+
+def test_findings_of_the_runs_are_said_once_whatever_the_number_of_vehicles(tmp_path, monkeypatch, capsys):
+    arguments = files(tmp_path)
+    table = (tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    spoiled = [*table[:20], re.sub(r"^([^,]*),[^,]*", r"\1,-999", table[20]), *table[21:]]
+    (tmp_path / "run.csv").write_text("\n".join(spoiled), encoding="utf-8")
+    for name in ("second", "third"):
+        (tmp_path / f"{name}.toml").write_bytes((tmp_path / "vehicle.toml").read_bytes())
+    others = [word for name in ("second", "third") for word in ("--vehicle", str(tmp_path / f"{name}.toml"))]
+    # refused after the runs are checked
+    code, said = command(monkeypatch, capsys, *arguments, *others, "--starts", str(10**12))
+    warnings = [line for line in said.splitlines() if line.startswith("warning: ")]
+    assert code == 2 and warnings and len(set(warnings)) == len(warnings), said
+    assert any("run.csv" in line for line in warnings)
