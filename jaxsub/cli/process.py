@@ -1,5 +1,6 @@
 """The command as a process: exit codes, signals, and one line for each way in which it ends early."""
 
+import gc
 import os
 import sys
 import traceback
@@ -74,6 +75,8 @@ def run(app: click.Group) -> None:
     Exit codes: 0 done, 1 an unexpected error or an output that could not be written, 2 bad input, 3 warnings with
     `--strict`, 130 interrupted by Ctrl-C or SIGTERM, as a batch system sends it.
     """
+    # imports and tracing make millions of objects, and looking through them at the default threshold costs seconds
+    gc.set_threshold(200_000, 50, 50)
     options = Options()
     with Watch(lambda: _line(_interruption(options))) as options.watch:
         code, message = _ended(app, options)

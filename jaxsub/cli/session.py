@@ -1,6 +1,5 @@
 """What every command sets up: double precision and the compilation cache."""
 
-import gc
 import glob
 import os
 import re
@@ -26,8 +25,6 @@ def start(long: bool = False) -> None:
     """
     if not long:
         _compile_quickly()
-    # tracing makes millions of short-lived objects, and collecting them at the default threshold costs seconds
-    gc.set_threshold(200_000, 50, 50)
     jax.config.update("jax_enable_x64", True)
     _keep_programs(Path(platformdirs.user_cache_dir("jaxsub")) / f"jax-{jax.__version__}")
 

@@ -2,7 +2,6 @@
 
 import functools
 
-import optax
 import optimistix as optx
 
 from ..filter.ekf import ExtendedKalmanFilter
@@ -43,6 +42,8 @@ def nelder_mead(tolerance: float = 1e-9) -> Iterative:
 @functools.cache
 def gradient(tolerance: float = 1e-9) -> Iterative:
     """First derivatives alone: optax's L-BFGS."""
+    import optax
+
     return Iterative(optx.OptaxMinimiser(optax.lbfgs(), rtol=tolerance, atol=tolerance), 500)
 
 

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from jaxsub.errors import InputError, optional
@@ -66,6 +65,8 @@ def _read_apart(path: Path) -> dict[str, Any]:
 
 def _check(path: Path, source: str) -> None:
     """Raise InputError where the file expands to more than it plausibly holds."""
+    import h5py
+
     size = path.stat().st_size
     if h5py.is_hdf5(path):
         sizes = []

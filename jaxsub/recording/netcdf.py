@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import h5py
 import numpy as np
 
 from jaxsub.findings import Finding
@@ -45,6 +44,8 @@ def read_netcdf(path: Path, source: str) -> Contents:
 
 def _checked(path: Path, source: str) -> Literal["scipy", "h5netcdf"]:
     """The name of the engine that reads the file, once what its headers claim has been found to be plausible."""
+    import h5py
+
     size = path.stat().st_size
     with path.open("rb") as file:
         if file.read(3) == _CLASSIC:

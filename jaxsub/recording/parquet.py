@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow
-from pyarrow import parquet
 
 from jaxsub.errors import InputError
 from jaxsub.recording.bounds import require_plausible
@@ -16,6 +15,8 @@ _WIDEST = 8  # bytes of a sample
 
 def read_parquet(path: Path, source: str) -> Contents:
     """The columns of a Parquet file."""
+    from pyarrow import parquet
+
     with reading(source, "Parquet"), parquet.ParquetFile(path) as file:
         held = file.metadata
         groups = sum(held.row_group(i).total_byte_size for i in range(held.num_row_groups))

@@ -70,7 +70,7 @@ def quick_columns(path: Path, dialect: Dialect, layout: Layout) -> list[Column] 
                     if isinstance(column, Instants):
                         column.add(tuple(cells.to_pylist()), row)
                     else:
-                        column.take(cells.to_numpy(zero_copy_only=False).copy())
+                        column.take(_floats(cells))
                 row += batch.num_rows
     except (pyarrow.ArrowException, ValueError, OSError):
         return None
@@ -80,6 +80,17 @@ def quick_columns(path: Path, dialect: Dialect, layout: Layout) -> list[Column] 
     if any(_is_time(column) and _missing(column.samples("")) for column in wanted.values()):
         return None
     return [wanted.get(index, column) for index, column in enumerate(known)]
+
+
+def _floats(cells: pyarrow.DoubleArray) -> np.ndarray:
+    """The numbers of a batch's column, NaN where there is none; Arrow's own conversion imports pandas first."""
+    valid, numbers = cells.buffers()
+    after = cells.offset + len(cells)
+    values = np.frombuffer(numbers, np.float64, after)[cells.offset :].copy()
+    if valid is not None:
+        known = np.unpackbits(np.frombuffer(valid, np.uint8), count=after, bitorder="little")[cells.offset :]
+        values[known == 0] = np.nan
+    return values
 
 
 def _missing(values: np.ndarray | InputError) -> bool:
