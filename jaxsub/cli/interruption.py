@@ -25,6 +25,7 @@ INTERRUPTED = 130
 GRACE = 3.0  # s that a command is given to end by itself
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _ANSWERED, _CLOSED = b"\0", b""
+_STDERR, _CLOSED_FILE = 2, -1
 _APART = "jaxsub interruptible"
 
 
@@ -38,8 +39,12 @@ class Watch:
     def __init__(self, message: Callable[[], str]):
         self._message, self._interrupted = message, False
         self._handlers: dict[int, Any] = {}
+        self._terminal = _CLOSED_FILE
 
     def __enter__(self) -> "Watch":
+        # its own, since standard error is turned away while readers of logs run
+        with contextlib.suppress(OSError):
+            self._terminal = os.dup(_STDERR)
         self._read, self._write = socket.socketpair()
         self._write.setblocking(False)
         for number in _SIGNALS:
@@ -54,6 +59,8 @@ class Watch:
         for number, handler in self._handlers.items():
             signal.signal(number, handler)
         self._write.close()
+        with contextlib.suppress(OSError):
+            os.close(self._terminal)
 
     def answer(self) -> None:
         """Let the command go on after the first signal, to keep what it has; a second one still ends it."""
@@ -84,9 +91,10 @@ class Watch:
                     interrupted = True
                     signals.settimeout(GRACE)
         abandon()
-        # a spinner has hidden the cursor
-        shown = "\x1b[?25h\n" if sys.stderr.isatty() else ""
-        print(f"{shown}{self._message()}", file=sys.stderr)
+        with contextlib.suppress(OSError):
+            # a spinner has hidden the cursor
+            shown = "\x1b[?25h\n" if os.isatty(self._terminal) else ""
+            os.write(self._terminal, f"{shown}{self._message()}\n".encode(errors="replace"))
         leave(INTERRUPTED)
 
 

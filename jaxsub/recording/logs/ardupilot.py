@@ -1,7 +1,6 @@
 """ArduPilot's logs: dataflash (.bin), which the vehicle writes, and telemetry (.tlog), which a ground station does."""
 
 import contextlib
-import io
 import mmap
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -68,13 +67,12 @@ class DataFlash(Log):
         self._check()
         kind: Any = self._package.DFReader_binary
         file: Any = kind.__new__(kind)  # to be closed also where its making fails
-        with _silence():
-            try:
-                kind.__init__(file, str(self._path))
-                yield file
-            finally:
-                if "filehandle" in vars(file):
-                    file.filehandle.close()
+        try:
+            kind.__init__(file, str(self._path))
+            yield file
+        finally:
+            if "filehandle" in vars(file):
+                file.filehandle.close()
 
     def _check(self) -> None:
         """Raise InputError for what the reader would take for ever over: no such log, or messages of no length."""
@@ -151,8 +149,7 @@ class Telemetry(MessageLog):
         return _SPELT.get(unit, unit)
 
     def _received(self) -> Iterator[tuple[str, str, Any]]:
-        with _silence():
-            file = self._package.mavlogfile(str(self._path))
+        file = self._package.mavlogfile(str(self._path))
         try:
             while (message := file.recv_msg()) is not None:
                 if message.get_type() not in ("BAD_DATA",) and not message.get_type().startswith("UNKNOWN"):
@@ -170,15 +167,3 @@ def _fields(fmt: Any) -> list[str]:
 def _unit(message: Any, field: str) -> str:
     unit: str = message.fmt.get_unit(field)
     return _SPELT.get(unit, unit)
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """The reader prints a line for each byte that it skips."""
-    with contextlib.redirect_stderr(_Nowhere()), contextlib.redirect_stdout(_Nowhere()):
-        yield
-
-
-class _Nowhere(io.TextIOBase):
-    def write(self, text: str) -> int:
-        return len(text)

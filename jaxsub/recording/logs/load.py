@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ...findings import Finding
 from ...units import TIME, UnknownUnit, column_unit, si_unit, split_header, to_si
 from ..reading import note, reading, require_file
 from ..recording import Recording
@@ -16,6 +15,7 @@ from .ardupilot import DataFlash, Telemetry
 from .log import Channel, Log, Series, taken
 from .mcap import McapLog
 from .merge import merged
+from .printed import printed
 from .rosbag import RosBag
 from .selection import Selection, Term
 from .slocum import SlocumLog
@@ -37,7 +37,7 @@ def channels(path: str | os.PathLike[str]) -> list[Channel]:
     Raises InputError for a file that cannot be read, or whose reader (`pip install 'jaxsub[logs]'`) is not installed.
     """
     path = Path(path)
-    with reading(str(path), "a log"):
+    with printed(str(path)), reading(str(path), "a log"):
         return opened(path).channels()
 
 
@@ -51,18 +51,18 @@ def load_log(
     """The columns of `selection` as one recording, named after the log.
 
     `held` columns are held between their samples and `interpolated` ones are joined by lines, as a vehicle takes its
-    inputs and its prescribed motions; `merged` says how the rest finds its rows. Raises InputError for a channel that
-    the log does not hold, a unit that is none, and all that a recording is refused for.
+    inputs and its prescribed motions; `merged` says how the rest finds its rows. What its reader reports of damage is a
+    warning in the recording's findings. Raises InputError for a channel that the log does not hold, a unit that is
+    none, and all that a recording is refused for.
     """
     path = Path(path)
     chosen = selection if isinstance(selection, Selection) else Selection(selection)
     terms = {header: chosen.term(header) for header in chosen.columns}
-    with reading(str(path), "a log"):
+    with printed(str(path)) as findings, reading(str(path), "a log"):
         log = opened(path)
         found = taken(log, str(path), sorted({t.channel for t in terms.values() if t.function not in _AXES}))
         turned = {c: _attitude(log, path, c) for c in {t.channel for t in terms.values() if t.function in _AXES}}
     columns: dict[str, Series] = {}
-    findings: list[Finding] = []
     for header, term in terms.items():
         name, unit = split_header(header)
         where = f"{chosen.source}, column {header!r}"
