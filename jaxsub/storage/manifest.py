@@ -17,7 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from .scratch import is_dead, scratch_folders
+from .scratch import is_dead, locked, scratch_folders
 
 MANIFEST = ".jaxsub.jsonl"
 _SCHEMA = 1
@@ -41,25 +41,31 @@ class Manifest:
 
     def begin(self, command: str) -> None:
         """Write the first line, unless there is one."""
-        if self._lines():
-            return
-        try:
-            version = metadata.version("jaxsub")
-        except metadata.PackageNotFoundError:  # a checkout that nobody installed
-            version = "not installed"
-        self._append({"schema": _SCHEMA, "jaxsub": version, "command": command})
+        with locked(self.path.parent):
+            if self._lines():
+                return
+            try:
+                version = metadata.version("jaxsub")
+            except metadata.PackageNotFoundError:  # a checkout that nobody installed
+                version = "not installed"
+            self._append({"schema": _SCHEMA, "jaxsub": version, "command": command})
 
     def add(self, file: Path, content: Path | None = None) -> None:
         """List `file` with what it holds, or with what is at `content` and will be moved there."""
-        name = file.relative_to(self.path.parent).as_posix()
-        self._append({"file": name, **_contents(file if content is None else content)})
+        line = {
+            "file": file.relative_to(self.path.parent).as_posix(),
+            **_contents(file if content is None else content),
+        }
+        with locked(self.path.parent):
+            self._append(line)
 
     def add_all(self) -> None:
         """List every file and folder beside the manifest and below."""
         root = self.path.parent
         for path in sorted(root.rglob("*")):
             if path.is_dir():
-                self._append({"folder": path.relative_to(root).as_posix()})
+                with locked(root):
+                    self._append({"folder": path.relative_to(root).as_posix()})
             elif path != self.path:
                 self.add(path)
 
@@ -111,6 +117,7 @@ class Manifest:
         return lines if lines and "jaxsub" in lines[0] and lines[0].get("schema") == _SCHEMA else []
 
     def _append(self, line: dict[str, Any]) -> None:
+        """Write a line, in a folder that is `locked`."""
         # begins with a line break, so that one that a crash cut off does not spoil this one
         with self.path.open("a", encoding="utf-8") as file:
             file.write(f"\n{json.dumps(line)}" if file.tell() else json.dumps(line))

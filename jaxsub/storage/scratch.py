@@ -79,7 +79,7 @@ def _folder(out: Path) -> Path:
 
 def _begun(folder: Path, out: Path) -> int:
     """Make the scratch folder of `out`; the descriptor of its file `lock`, locked."""
-    with _locked(folder.parent):
+    with locked(folder.parent):
         for other in scratch_folders(folder.parent):
             if not is_dead(other):
                 _require_other_key(other, folder, out)
@@ -145,8 +145,8 @@ def _clear(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def _locked(parent: Path) -> Iterator[None]:
-    """`parent` for this process alone, so that two that begin at once see each other."""
+def locked(parent: Path) -> Iterator[None]:
+    """`parent` for this thread of this process alone, so that two that begin at once see each other."""
     if fcntl is None:
         yield
         return

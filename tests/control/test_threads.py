@@ -1,13 +1,13 @@
 """What threads may share gives each of them the numbers that it gives a caller alone, to the last bit."""
 
 import shutil
-import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from threads import THREADS, same_in_threads
 
 from jaxsub.control import (
     Mpc,
@@ -25,29 +25,10 @@ from jaxsub.filter import Sample, on_line
 from jaxsub.symbolic import compiled
 from jaxsub.vehicle.catalogue import nps_auv_ii
 
-THREADS = 4
-
 
 @pytest.fixture(scope="module")
 def plant():
     return discretise(nps_auv_ii(), 0.2)
-
-
-def same_in_threads(call, arguments, rounds=1):
-    """`call(*at)` in threads that begin together, each through all arguments from a place of its own, against alone."""
-    expected, count = [call(*at) for at in arguments], len(arguments)
-    begin = threading.Barrier(THREADS)
-
-    def one(number):
-        begin.wait()
-        order = [(k + number * count // THREADS) % count for k in range(count)] * rounds
-        return [(k, call(*arguments[k])) for k in order]
-
-    with ThreadPoolExecutor(THREADS) as pool:
-        for answers in pool.map(one, range(THREADS)):
-            for k, found in answers:
-                for a, b in zip(found, expected[k], strict=True):
-                    np.testing.assert_array_equal(a, b)
 
 
 def points(plant, count, seed=2):

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from rigs import body, chosen, coupled, driven, oscillator, stacked
+from threads import same_in_threads
 
 from jaxsub.effects import AbstractActuator, parameter_table
 from jaxsub.errors import InputError
@@ -118,6 +119,15 @@ def test_batches_of_batches_and_recordings_of_their_own():
             y, outputs[0] if axis is None else outputs
         )
         close(batched(fast), batched(made))
+
+
+def test_threads_find_what_one_finds_alone():
+    """Claim: one compiled march gives each of several threads the cost and expansion at its own coordinates."""
+    fast = problem(coupled()).in_c()
+    steps = np.random.default_rng(7).normal(size=(12, fast.coordinates().size))
+    y = [(fast.coordinates() + 0.02 * step,) for step in steps]
+    of = jax.jit(lambda y: (fast.cost(y), *jax.tree.leaves(fast.expand(y)))).lower(*y[0]).compile()
+    same_in_threads(of, y, rounds=20)
 
 
 def test_a_run_that_ended_may_go_anywhere_afterwards():

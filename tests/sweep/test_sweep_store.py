@@ -1,6 +1,8 @@
 """A sweep's folder opens as labelled arrays, does again what is missing in it, and takes no other plan."""
 
 import dataclasses
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +12,9 @@ from sweep_cases import plan, recordings, vehicle
 
 from jaxsub.errors import InputError
 from jaxsub.simulate import synthetic
+from jaxsub.storage import Manifest
 from jaxsub.sweep import OUTCOMES, Plan, Store, open_sweep, sweep
+from jaxsub.sweep.store import read_chunk
 
 
 def made_up(chunk, p, d):
@@ -129,3 +133,46 @@ def test_what_is_no_sweep_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"plan\.json"):
         sweep(plan(), tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_threads_that_write_chunks_leave_what_one_leaves(tmp_path):
+    """Claim: all chunks are there, read back as they were written, and listed in the manifest, whoever begins it."""
+    found = {}
+    for name, count in (("serial", 1), ("threads", len(plan().chunks()))):
+        store, made = Store.of(tmp_path / name, plan())
+        manifest, begin = Manifest.of_folder(tmp_path / name), threading.Barrier(count)
+        manifest.path.unlink()
+
+        def one(chunk, store=store, begin=begin):
+            begin.wait()
+            store.write(chunk, made_up(chunk, 3, 5))
+
+        with ThreadPoolExecutor(count) as pool:
+            list(pool.map(one, made.chunks()))
+        assert store.missing(made.chunks()) == []
+        files = sorted((tmp_path / name / "cells").glob("*"))
+        assert len(files) == len(made.chunks()) and all(manifest.lists(path) for path in files)
+        found[name] = [read_chunk(path, store.name) for path in files]
+    for (chunk, answers), (other, others) in zip(found["serial"], found["threads"], strict=True):
+        assert chunk == other and answers.keys() == others.keys()
+        for name in answers:
+            np.testing.assert_array_equal(answers[name], others[name])
+
+
+def test_manifest_is_begun_once_by_threads_that_begin_together(tmp_path):
+    """Claim: one first line, and every file listed."""
+    count = 16
+    begin = threading.Barrier(count)
+
+    def one(number):
+        manifest = Manifest.of_folder(tmp_path)
+        (tmp_path / f"{number}.txt").write_text(str(number), encoding="utf-8")
+        begin.wait()
+        manifest.begin("test")
+        manifest.add(tmp_path / f"{number}.txt")
+
+    with ThreadPoolExecutor(count) as pool:
+        list(pool.map(one, range(count)))
+    assert Manifest.of_folder(tmp_path).foreign() is None
+    text = Manifest.of_folder(tmp_path).path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) == count + 1 and text.count("schema") == 1
