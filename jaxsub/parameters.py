@@ -68,7 +68,7 @@ class Transform(eqx.Module):
         start = np.asarray(start, float)
         lower, upper = (np.array([getattr(p, side) for p in parameters], float) for side in ("lower", "upper"))
         scale = np.where(start == 0.0, 1.0, np.abs(start))
-        return cls(*(jnp.asarray(a) for a in (lower, upper, start, scale)))
+        return cls(*jax.device_put((lower, upper, start, scale)))
 
     def to_physical(self, y: Float[Array, " p"]) -> Float[Array, " p"]:
         """Physical values of the coordinates `y`."""
@@ -78,6 +78,7 @@ class Transform(eqx.Module):
         one = jnp.where(low, lower + soft, upper - soft)
         return self._as_bounded(both, one, self.centre + self.scale * y)
 
+    @eqx.filter_jit
     def to_free(self, theta: Float[Array, " p"]) -> Float[Array, " p"]:
         """Coordinates of the physical values `theta`, which are first moved just inside their bounds."""
         low, lower, upper = self._bounds()

@@ -78,10 +78,12 @@ def _unlikely(y: Array, given: _Given) -> tuple[Array, Array]:
     return 0.5 * jnp.sum(away**2 + over**2), each(*_LOOSE) ** -2.0 + (over > 0.0) * _EDGE**-2.0
 
 
+@eqx.filter_jit
 def _cost(y: Array, given: _Given) -> Array:
     return restricted(_parts(given, y), given.system, given.columns, given.prior) + _unlikely(y, given)[0]
 
 
+@eqx.filter_jit
 def _expand(given: _Given, y: Array) -> Expansion:
     """The cost to second order, with the average information for its curvature."""
     system, columns, prior = given.system, given.columns, given.prior

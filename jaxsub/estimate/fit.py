@@ -3,6 +3,7 @@
 import dataclasses
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -128,20 +129,19 @@ def search(
     out: fit, take the rms, fit again from there, until it settles.
     """
     given = [output.sigma for output in vehicle.layout.outputs]
-    estimated = jnp.array([s is None and sigma is None for s in given])
-    noise = (
-        jnp.asarray(sigma)
-        if sigma is not None
-        else jnp.where(estimated, _signal(runs), jnp.array([s or 1.0 for s in given]))
-    )
+    estimated = np.array([s is None and sigma is None for s in given], bool)
+    noise = np.array([s or 1.0 for s in given], float) if sigma is None else sigma
+    if estimated.any():
+        noise = np.where(estimated, np.asarray(_signal(runs)), noise)
+    noise = jax.device_put(noise)
     problem = Problem.of(vehicle, runs, noise, start, moving=moving, known_start=known_start)
-    y, total = problem.coordinates(), jnp.asarray(0)
+    y, total = problem.coordinates(), 0
     for _ in range(_CONCENTRATIONS):
-        found = (method or gauss_newton()).run(problem, y[None]).one(0)
+        found = (method or gauss_newton()).run(problem, jax.device_put(np.asarray(y)[None])).one(0)
         y, cost, result = found.y, found.cost, found.result
-        total = total + found.evaluations
+        total += int(found.evaluations)
         fitted, states = problem.split(y)
-        if not bool(estimated.any()) or not bool(jnp.isfinite(cost)):
+        if not estimated.any() or not np.isfinite(cost):
             break
         rms = concentrated_sigma(output_errors(fitted, runs, states), runs)
         settled = bool(jnp.all(jnp.abs(rms / problem.sigma - 1.0) < 0.003, where=estimated))
@@ -149,7 +149,7 @@ def search(
         problem = dataclasses.replace(problem, sigma=jnp.where(estimated & (rms > 0.0), rms, problem.sigma))
         if settled:
             break
-    return Ended(fitted, runs, states, problem.sigma, cost, total, result, known_start=known_start)
+    return Ended(fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=known_start)
 
 
 @eqx.filter_jit
@@ -163,6 +163,7 @@ def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Array) -> Float[A
     return residual_outputs(vehicle, runs, predict(vehicle, runs, start))
 
 
+@eqx.filter_jit
 def _signal(runs: Runs) -> Array:
     """The standard deviation of each measured channel: where the search for its noise starts."""
     count = jnp.maximum(runs.samples(), 1.0)
@@ -217,15 +218,15 @@ def evaluate(ended: Ended) -> Fit:
     if isinstance(ended, Fit):
         return ended
     model = linearise(ended.vehicle, ended.runs, ended.start)
-    covariance, gradient, pressed = _statistics(ended.problem, model)
+    covariance, gradient, pressed, result = _statistics(ended.problem, model, ended.result)
     told = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
-    told["result"] = judged(ended.vehicle, gradient, ended.result)
+    told["result"] = result
     return Fit(**told, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
 
 
 @eqx.filter_jit
-def _statistics(problem: Problem, model: Linearised) -> tuple[Array, Array, Array]:
-    """Covariance of the free parameters, the gradient in standard errors, and which bound each presses on."""
+def _statistics(problem: Problem, model: Linearised, result: RESULTS) -> tuple[Array, Array, Array, RESULTS]:
+    """Covariance of the free parameters, gradient in standard errors, bound that each presses on, judged `result`."""
     information, gradient = information_matrix(problem, model)
     rows, values = problem.vehicle.layout.free, problem.vehicle.values()
     at = jnp.array([values[row.name] for row in rows])
@@ -237,7 +238,8 @@ def _statistics(problem: Problem, model: Linearised) -> tuple[Array, Array, Arra
     covariance = inverse_information(alone(information, pressed != 0.0))
     own = inverse_information(information)
     covariance = jnp.where(jnp.diag(pressed != 0.0), own, covariance)
-    return covariance, jnp.max(away, initial=0.0), pressed
+    farthest = jnp.max(away, initial=0.0)
+    return covariance, farthest, pressed, judged(problem.vehicle, farthest, result)
 
 
 def inverse_information(information: Float[Array, "p p"]) -> Float[Array, "p p"]:

@@ -1,5 +1,6 @@
 """Initial states of runs: at rest, or from the first samples, with how far they may be from there."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -41,7 +42,7 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
             if there.any():
                 guess[run, i] = outputs[run, there, column][0]
                 spread[i] = max(spread[i], _change(times[run, there], outputs[run, there, column]))
-    return jnp.asarray(guess), jnp.asarray(spread)
+    return tuple(jax.device_put((guess, spread)))
 
 
 def rest(vehicle: AbstractVehicle, count: int) -> Float[Array, "r s"]:

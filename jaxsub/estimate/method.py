@@ -46,7 +46,7 @@ class Found(eqx.Module):
 
     def one(self, index: int) -> "Found":
         """Where the search numbered `index` ended."""
-        return jax.tree.map(lambda leaf: leaf[index], self)
+        return jax.tree.map(lambda leaf: np.asarray(leaf)[index], self)
 
 
 class AbstractMethod(eqx.Module):

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -69,25 +70,31 @@ class Problem(eqx.Module):
         """
         rows = vehicle.layout.free
         values = vehicle.values()
-        theta = np.array([float(values[row.name]) for row in rows])
+        theta = np.array([float(values[row.name]) for row in rows], float)
         own = vehicle.own_values()
         # an effect without a prior starts at its fitted or predicted size, which is no prior knowledge
         known = lambda row: row.name in own or math.isfinite(row.prior_std)
         means = [row.prior_mean if known(row) else float(values[row.name]) for row in rows]
         guess, spread = initial_guess(vehicle, runs)
         transform = Transform.of(rows, theta)
+        # `jnp.asarray` would make a program of every shape
+        arrays: dict[str, Any] = jax.device_put(
+            {
+                "moving": np.broadcast_to(np.asarray(moving), (len(rows),)),
+                "prior_mean": np.array(means, float),
+                "prior_std": np.array([row.prior_std for row in rows], float),
+                "spread": np.zeros(len(spread)) if known_start else spread,
+            }
+        )
         return cls(
             vehicle,
             runs,
             jnp.asarray(sigma),
             transform,
-            transform.to_free(jnp.asarray(theta)),
-            jnp.broadcast_to(jnp.asarray(moving), (len(rows),)),
-            jnp.asarray(means),
-            jnp.asarray([row.prior_std for row in rows]),
-            guess if start is None else start,
-            jnp.zeros_like(spread) if known_start else spread,
-            known_start,
+            transform.to_free(transform.centre),
+            guess=guess if start is None else start,
+            known_start=known_start,
+            **arrays,
         )
 
     def in_c(self) -> "Problem":
@@ -101,6 +108,7 @@ class Problem(eqx.Module):
         march = March(free.vehicle_at, (near(), near()), self.runs, start=not self.known_start)
         return dataclasses.replace(self, march=march)
 
+    @eqx.filter_jit
     def split(self, y: Float[Array, " d"]) -> tuple[AbstractVehicle, Float[Array, "r s"]]:
         """The vehicle and the initial states that the coordinates `y` stand for."""
         return self.vehicle_at(y[: len(self.prior_mean)]), self.guess + self.spread * self.moved(y)
@@ -118,7 +126,7 @@ class Problem(eqx.Module):
 
     def coordinates(self) -> Float[Array, " d"]:
         """The coordinates of the start."""
-        return jnp.concatenate([self.origin, jnp.zeros(0 if self.known_start else self.guess.size)])
+        return jnp.pad(self.origin, (0, 0 if self.known_start else self.guess.size))
 
     def at(self, theta: Float[Array, " p"]) -> Float[Array, " d"]:
         """The coordinates of the physical parameters `theta` and the guessed initial states."""
@@ -147,6 +155,7 @@ class Problem(eqx.Module):
         squares = self.march.squares(self.vehicle_at, y[: len(self.prior_mean)], start, self.runs, self.sigma)
         return 0.5 * (jnp.sum(squares) + jnp.sum(_prior(self, y) ** 2))
 
+    @eqx.filter_jit
     def expand(self, y: Float[Array, " d"]) -> "Expansion":
         """The cost about `y` to second order, its curvature by Gauss and Newton: $J^TJ$."""
         p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
@@ -178,6 +187,7 @@ class Problem(eqx.Module):
         every = jnp.concatenate([columns, error[..., None]], axis=-1)
         return jnp.einsum("rkca,rkcb->rab", every, every)
 
+    @eqx.filter_jit
     def expand_exactly(self, y: Float[Array, " d"]) -> "Expansion":
         """The cost about `y` to second order, its curvature exact."""
         cost, gradient, hessian, _ = second_order(lambda y, _: (self.cost(y), None), y, None)

@@ -2,8 +2,10 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -58,7 +60,7 @@ class Runs(eqx.Module):
         # by NumPy, for which no program has to be made
         taken = {name: np.asarray(getattr(self, name))[index] for name in arrays}
         taken["mask"] &= np.arange(size)[:, None, None] < len(chosen)
-        return dataclasses.replace(self, **{name: jnp.asarray(array) for name, array in taken.items()})
+        return dataclasses.replace(self, **jax.device_put(taken))
 
     def segments(self, count: int) -> "Runs":
         """Every run cut into `count` pieces of equal length, each a run of its own that starts where the last ended.
@@ -122,17 +124,19 @@ def stack_runs(
     noise = 8.0 * np.finfo(float).eps * max(float(np.abs(r.times).max()) for r in recordings)
     steps, step_of = _group(np.where(intervals > 0.0, intervals, intervals[intervals > 0.0][0]), noise)
     z = np.stack(outputs)
+    arrays: dict[str, Any] = {
+        "times": np.stack(times),
+        "steps": steps,
+        "step_of": step_of,
+        "live": intervals > 0.0,
+        "signals": np.stack(signals),
+        "outputs": np.where(np.isnan(z), 0.0, z),
+        "mask": ~np.isnan(z),
+    }
+    held_first = (True,) * len(held) + (False,) * len(interpolated)
+    # `jnp.asarray` would make a program of every shape
     return Runs(
-        jnp.asarray(np.stack(times)),
-        jnp.asarray(steps),
-        jnp.asarray(step_of),
-        jnp.asarray(intervals > 0.0),
-        jnp.asarray(np.stack(signals)),
-        jnp.asarray(np.where(np.isnan(z), 0.0, z)),
-        jnp.asarray(~np.isnan(z)),
-        (True,) * len(held) + (False,) * len(interpolated),
-        tuple(name in whole for name in channels),
-        substeps,
+        **jax.device_put(arrays), held=held_first, counted=tuple(n in whole for n in channels), substeps=substeps
     )
 
 
