@@ -94,7 +94,7 @@ def assemble(every: Lines) -> dict:
             c: scoring.rate(scoring.first_kind(families(x), ours(x)) for x in told if x["condition"] == c)
             for c in dict.fromkeys(x["condition"] for x in told)
         },
-        "false_alarm": {k: scoring.rate(ours(x).get("verdict") != "none" for x in c) for k, c in clean.items()},
+        "false_alarm": {k: scoring.rate(scoring.false_alarm(ours(x)) for x in c) for k, c in clean.items()},
         "unknown_recall": scoring.rate(is_right(x, ours(x)) for x in lines if x["condition"] == "outside"),
         "all_named_with_extras": {
             c: scoring.rate(scoring.among(x["truth"]["names"], ours(x)) for x in lines if x["condition"] == c)

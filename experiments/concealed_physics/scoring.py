@@ -46,6 +46,15 @@ def right(names: Sequence[str], answer: dict) -> bool:
     return len(distinct) == len(set(names)) and _matched(list(dict.fromkeys(names)), list(distinct))
 
 
+def false_alarm(answer: dict) -> bool:
+    """Whether an answer to a case with nothing concealed names physics, which is not there.
+
+    `unknown` names none: it says that a test run's error is larger than its noise, as coloured noise can make it. It is
+    not `right` there either, so that the two rates need not add up to one.
+    """
+    return answer.get("verdict") in ("named", "ambiguous")
+
+
 def _matched(names: list[str], sets: list[tuple[str, ...]]) -> bool:
     """Whether every name has an entry of its own that puts it forward, in some order."""
     if not names:

@@ -143,6 +143,16 @@ def test_the_first_kind_is_that_of_a_concealed_effect(families, kinds, expected)
     assert scoring.first_kind(families, {"kinds": kinds}) is expected
 
 
+@pytest.mark.parametrize(
+    ("verdict", "alarm", "right"),
+    [("none", False, True), ("unknown", False, False), ("named", True, False), ("ambiguous", True, False)],
+)
+def test_a_false_alarm_names_physics_where_nothing_is_concealed(verdict, alarm, right):
+    given = answer(verdict, *[("a", 1.0, [])] * alarm)
+    assert scoring.false_alarm(given) is alarm
+    assert scoring.right([], given) is right
+
+
 def test_every_concealed_effect_is_of_a_known_kind():
     """Claim: the families of the concealed effects are those of effects.md, so that none is structure by mistake."""
     known = {"hull", "hydrostatics", "propulsion", "mechanisms", "outside", *scoring.KINDS}
