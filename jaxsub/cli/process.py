@@ -1,6 +1,7 @@
 """The command as a process: exit codes, signals, and one line for each way in which it ends early."""
 
 import gc
+import logging
 import os
 import sys
 import traceback
@@ -78,6 +79,8 @@ def run(app: click.Group) -> None:
     # imports and tracing make millions of objects, and looking through them at the default threshold costs seconds
     gc.set_threshold(200_000, 50, 50)
     options = Options()
+    # where a home cannot be written Matplotlib keeps its fonts in a temporary folder, and says so twice
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     with Watch(lambda: _line(_interruption(options))) as options.watch:
         code, message = _ended(app, options)
         if message:

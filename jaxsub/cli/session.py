@@ -26,20 +26,34 @@ def start(long: bool = False) -> None:
     if not long:
         _compile_quickly()
     jax.config.update("jax_enable_x64", True)
-    _keep_programs(Path(platformdirs.user_cache_dir("jaxsub")) / f"jax-{jax.__version__}")
+    _keep_programs()
 
 
-def _keep_programs(folder: Path) -> None:
-    """Keep compiled programs in `folder`; without one that can be made, go on and compile them every time."""
+def _keep_programs() -> None:
+    """Keep compiled programs in the user's cache; without a folder for it, go on and compile them every time."""
     try:
+        folder = _cache() / f"jax-{jax.__version__}"
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        terminal.note(f"note: compiled programs are not kept: {folder}: {error.strerror}; set XDG_CACHE_HOME")
+        where = f"{error.filename}: {error.strerror}" if error.filename else error
+        terminal.note(f"note: compiled programs are not kept: {where}; set XDG_CACHE_HOME")
         return
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     _repair(folder)
+
+
+def _cache() -> Path:
+    """The user's cache folder for jaxsub. **Raises** `OSError` where there is none, as for a user without a home."""
+    try:
+        folder = Path(platformdirs.user_cache_dir("jaxsub"))
+    except RuntimeError:
+        folder = Path()
+    # some versions of platformdirs raise, others answer with a folder named ~
+    if not folder.is_absolute():
+        raise OSError("there is no home folder")
+    return folder
 
 
 class _Repair:

@@ -19,11 +19,12 @@ print(jax.jit(tripled)(jnp.arange(3.0)))
 """
 
 
-def ran(starts=1, **environment):
+def ran(starts=1, before="", folder=None, **environment):
     base = {name: value for name, value in os.environ.items() if name not in ("HOME", "XDG_CACHE_HOME", "XLA_FLAGS")}
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM.format(starts=starts)],
+        [sys.executable, "-c", before + PROGRAM.format(starts=starts)],
         env=base | {"PYTHONPATH": str(ROOT), "JAX_PLATFORMS": "cpu"} | environment,
+        cwd=folder,
         capture_output=True,
         text=True,
         timeout=120,
@@ -37,6 +38,21 @@ def ran(starts=1, **environment):
 def test_without_a_home_that_can_be_written_it_goes_on_and_says_so(home):
     said = ran(HOME=home)
     assert said.count("\n") == 1 and said.startswith("note: compiled programs are not kept")
+
+
+UNKNOWN_USER = """
+import pwd
+def unknown(uid):
+    raise KeyError(uid)
+pwd.getpwuid = unknown
+"""
+
+
+def test_for_a_user_without_a_home_nothing_is_written_to_the_current_folder(tmp_path):
+    """Claim: no folder named ~ comes to be there."""
+    said = ran(before=UNKNOWN_USER, folder=tmp_path)
+    assert said.count("\n") == 1 and "there is no home folder; set XDG_CACHE_HOME" in said
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("damage", [lambda entry: entry[: len(entry) // 2], lambda entry: b"", lambda entry: b"x" * 99])
