@@ -1,7 +1,7 @@
-"""What kinematics says of channels, without any model of forces: which rate belongs to which channel."""
+"""Kinematic relations between channels, without any model of forces: which rate belongs to which channel."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -10,161 +10,181 @@ from ..vehicle import Layout
 
 _EQUATION_OF = {velocity: equation for equation, velocity in VELOCITIES.items()}
 _FREE_WITH = {"phi": "roll", "theta": "pitch", "psi": "yaw"}
+_EULER = ("phi", "theta", "psi")
+
+
+@dataclasses.dataclass(frozen=True)
+class Motions:
+    """The motions of a vehicle in one run: measured, prescribed, locked, or not known.
+
+    **Fields**
+
+    - `columns`: the samples (samples,) of each motion that is measured or prescribed, NaN where missing.
+    - `constants`: the value of each motion whose degree of freedom is locked.
+    """
+
+    columns: Mapping[str, np.ndarray]
+    constants: Mapping[str, float]
+
+    @classmethod
+    def of(cls, layout: Layout, columns: Mapping[str, np.ndarray], speed: float) -> "Motions":
+        """The motions of a run with the samples `columns`; `speed` (m/s) is that of a body whose surge is locked."""
+        prescribed = dict(layout.prescribed)
+        named = {name: columns[column] for name, column in prescribed.items() if column in columns}
+        named |= {name: columns[name] for name in layout.channels if name in columns}
+        there = {name: values for name, values in named.items() if np.isfinite(values).any()}
+        every = {**_EQUATION_OF, **_FREE_WITH} if layout.kind == "submerged-body" else {}
+        locked = [n for n, equation in every.items() if equation not in layout.equations and n not in prescribed]
+        return cls(there, {name: speed if name == "u" else 0.0 for name in locked if name not in there})
+
+    def knows(self, *names: str) -> bool:
+        """Whether all these motions are measured, prescribed or locked."""
+        return all(name in self.columns or name in self.constants for name in names)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """The samples of a motion; zero where it is not known."""
+        if name in self.columns:
+            return self.columns[name]
+        return np.full(next(iter(self.columns.values())).shape, self.constants.get(name, 0.0))
+
+    def replaced(self, columns: Mapping[str, np.ndarray]) -> "Motions":
+        """These motions with other samples of some."""
+        return dataclasses.replace(self, columns={**self.columns, **columns})
 
 
 @dataclasses.dataclass(frozen=True)
 class Relation:
-    """A channel and the rate that it should have.
+    """A channel and the rate that kinematics gives it.
 
     **Fields**
 
     - `channel`: whose changes are looked at; `partner`: the channel whose own rate that is, as `r` of `psi`, or the
       formula of several.
-    - `values`, `rate`: (samples,), NaN where not known.
+    - `rate`: gives the rate (samples,) of `channel` from the motions.
+    - `among`: the measured channels that take part, `channel` included.
     - `direct`: whether `partner` is a single channel. `exact`: whether every term is measured or at rest.
+    - `arms`: gives what a sensor 1 m off the origin along each body axis adds to `channel`, (3, samples); None for
+      angles and their rates, which have no arm.
+    - `offset`: the largest mean of the rate (unit of `channel` a second) that is no fault, such as a current's; that
+      of a direct relation is a share of the rate itself.
     """
 
     channel: str
     partner: str
-    values: np.ndarray
-    rate: np.ndarray
+    rate: Callable[[Motions], np.ndarray]
+    among: frozenset[str]
     direct: bool
     exact: bool
-
-
-class Motions:
-    """The motions of a body in one run: measured, prescribed, locked, or not known."""
-
-    def __init__(self, layout: Layout, columns: Mapping[str, np.ndarray], count: int, speed: float):
-        prescribed = dict(layout.prescribed)
-        self._columns = {name: columns[column] for name, column in prescribed.items() if column in columns}
-        self._columns |= {name: columns[name] for name in layout.channels if name in columns}
-        self._layout, self._zero, self._speed = layout, np.zeros(count), speed
-
-    def measured(self, name: str) -> np.ndarray | None:
-        """The samples of a motion, if it has a column with some."""
-        values = self._columns.get(name)
-        return None if values is None or not np.isfinite(values).any() else values
-
-    def angle(self, name: str) -> np.ndarray | None:
-        """The samples of an angle, if its turns are counted."""
-        values = self.measured(name)
-        if values is None or np.max(np.abs(np.diff(values[np.isfinite(values)])), initial=0.0) > np.pi:
-            return None
-        return values
-
-    def known(self, name: str) -> np.ndarray | None:
-        """The samples of a motion; zero, or the operating speed, where its degree of freedom is locked."""
-        values = self.measured(name)
-        if values is not None:
-            return values
-        equation = _EQUATION_OF.get(name, _FREE_WITH.get(name, ""))
-        if equation and equation not in self._layout.equations and name not in dict(self._layout.prescribed):
-            return self._zero + (self._speed if name == "u" else 0.0)
-        return None
-
-    def small(self, name: str) -> tuple[np.ndarray, bool]:
-        """The samples of a motion and whether they are known; zero where not."""
-        values = self.known(name)
-        return (self._zero, False) if values is None else (values, True)
+    arms: Callable[[Motions], np.ndarray] | None = None
+    offset: float = 0.0
 
 
 def body_relations(motions: Motions) -> list[Relation]:
-    """Every relation of a body's channels for which the leading terms are measured."""
-    found = [*_attitude(motions), *_vertical(motions), *_horizontal(motions), *_derived(motions)]
-    return [*found, *_accelerations(motions)]
+    """Every relation of a body's channels for which the leading terms are known."""
+    return [*_attitude(motions), *_position(motions), *_derived(motions), *_accelerations(motions)]
 
 
-def mechanism_relations(layout: Layout, columns: Mapping[str, np.ndarray]) -> list[Relation]:
+def mechanism_relations(layout: Layout, motions: Motions) -> list[Relation]:
     """Each coordinate of a mechanism with its rate."""
-    pairs = [(e, f"{e}_rate") for e in layout.equations if e in columns and f"{e}_rate" in columns]
-    return [Relation(e, rate, columns[e], columns[rate], True, True) for e, rate in pairs]
+    pairs = [(e, f"{e}_rate") for e in layout.equations if {e, f"{e}_rate"} <= set(motions.columns)]
+    return [_direct(motions, channel, rate) for channel, rate in pairs]
+
+
+def _direct(motions: Motions, channel: str, partner: str) -> Relation:
+    return Relation(channel, partner, lambda m: m[partner], frozenset({channel, partner}), True, True)
 
 
 def _attitude(motions: Motions) -> list[Relation]:
-    phi, phi_known = motions.small("phi")
-    theta, theta_known = motions.small("theta")
-    q, q_known = motions.small("q")
-    r, r_known = motions.small("r")
-    p = motions.measured("p")
-    turning = (q * np.sin(phi) + r * np.cos(phi)) / _away_from_zero(np.cos(theta))
-    # what is not measured is taken as zero, and then less is concluded
-    found = []
-    for channel, partner, rate, exact in (
-        ("psi", "r", turning, phi_known and theta_known and q_known),
-        ("theta", "q", q * np.cos(phi) - r * np.sin(phi), phi_known and r_known),
-        ("phi", "p", None if p is None else p + turning * np.sin(theta), theta_known and q_known and r_known),
-    ):
-        values = motions.angle(channel)
-        if values is not None and rate is not None and motions.measured(partner) is not None:
-            found.append(Relation(channel, partner, values, rate, True, exact))
-    return found
+    def turning(m: Motions) -> np.ndarray:
+        return (m["q"] * np.sin(m["phi"]) + m["r"] * np.cos(m["phi"])) / _away_from_zero(np.cos(m["theta"]))
 
-
-def _vertical(motions: Motions) -> list[Relation]:
-    (u, theta, w), found = (motions.known(name) for name in ("u", "theta", "w")), []
-    if (
-        u is None
-        or theta is None
-        or w is None
-        or not any(motions.measured(name) is not None for name in ("w", "theta"))
-    ):
-        return []
-    (phi, phi_known), (v, v_known) = motions.small("phi"), motions.small("v")
-    sinking = -u * np.sin(theta) + (v * np.sin(phi) + w * np.cos(phi)) * np.cos(theta)
-    for channel in ("z", "depth"):
-        values = motions.measured(channel)
-        if values is not None:
-            exact = phi_known and v_known
-            found.append(Relation(channel, "-u sin(theta) + w cos(theta)", values, sinking, False, exact))
-    return found
-
-
-def _horizontal(motions: Motions) -> list[Relation]:
-    u, psi = motions.known("u"), motions.measured("psi")
-    if u is None or psi is None:
-        return []
-    motion = {name: motions.small(name) for name in ("v", "w", "phi", "theta")}
-    v, w, phi, theta = (motion[name][0] for name in ("v", "w", "phi", "theta"))
-    exact = all(known for _, known in motion.values())
-    across = v * np.cos(phi) - w * np.sin(phi)
-    ahead = u * np.cos(theta) + (v * np.sin(phi) + w * np.cos(phi)) * np.sin(theta)
     rates = {
-        "x": (ahead * np.cos(psi) - across * np.sin(psi), "u cos(psi) - v sin(psi)"),
-        "y": (ahead * np.sin(psi) + across * np.cos(psi), "u sin(psi) + v cos(psi)"),
+        "psi": ("r", turning, ("phi", "theta", "q")),
+        "theta": ("q", lambda m: m["q"] * np.cos(m["phi"]) - m["r"] * np.sin(m["phi"]), ("phi", "r")),
+        "phi": ("p", lambda m: m["p"] + turning(m) * np.sin(m["theta"]), ("theta", "q", "r")),
     }
     return [
-        Relation(name, formula, values, rate, False, exact)
-        for name, (rate, formula) in rates.items()
-        if (values := motions.measured(name)) is not None
+        # what is not known is taken as zero, and then less is concluded
+        Relation(channel, partner, rate, _among(motions, channel, partner, *others), True, motions.knows(*others))
+        for channel, (partner, rate, others) in rates.items()
+        if {channel, partner} <= set(motions.columns) and _counted(motions[channel])
     ]
 
 
-def _derived(motions: Motions) -> list[Relation]:
+def _position(motions: Motions) -> list[Relation]:
+    """x, y and z with the velocities, turned from body axes to the earth's."""
     found = []
-    for channel, partner in (("z", "depth_rate"), ("depth", "depth_rate"), ("psi", "heading_rate")):
-        values, rate = (
-            motions.angle(channel) if channel == "psi" else motions.measured(channel),
-            motions.measured(partner),
-        )
-        if values is not None and rate is not None:
-            found.append(Relation(channel, partner, values, rate, True, True))
+    formulas = {
+        "x": (0, "u cos(psi) - v sin(psi)", ("u", "psi"), 2.0),
+        "y": (1, "u sin(psi) + v cos(psi)", ("u", "psi"), 2.0),
+        "z": (2, "-u sin(theta) + w cos(theta)", ("u", "theta", "w"), 0.3),
+        "depth": (2, "-u sin(theta) + w cos(theta)", ("u", "theta", "w"), 0.3),
+    }
+    for channel, (row, formula, leading, offset) in formulas.items():
+        moving = any(name in motions.columns for name in leading)
+        if channel not in motions.columns or not motions.knows(*leading) or not moving:
+            continue
+
+        def rate(m: Motions, row: int = row) -> np.ndarray:
+            along, across, down = _axes(m, row)
+            return along * m["u"] + across * m["v"] + down * m["w"]
+
+        others = ("u", "v", "w", "phi", "theta", "psi") if row < 2 else ("u", "v", "w", "phi", "theta")
+        among, exact = _among(motions, channel, *others), motions.knows(*others)
+        arms = lambda m, row=row: np.array(_axes(m, row))
+        found.append(Relation(channel, formula, rate, among, False, exact, arms, offset))
     return found
+
+
+def _axes(motions: Motions, row: int) -> list[np.ndarray]:
+    """The components of the body's axes along x, y or z of the earth: a row of the rotation matrix."""
+    (sf, st, sp), (cf, ct, cp) = ([f(motions[name]) for name in _EULER] for f in (np.sin, np.cos))
+    rows = (
+        lambda: [cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf],
+        lambda: [sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf],
+        lambda: [-st, ct * sf, ct * cf],
+    )
+    return rows[row]()
+
+
+def _derived(motions: Motions) -> list[Relation]:
+    pairs = (("z", "depth_rate"), ("depth", "depth_rate"), ("psi", "heading_rate"))
+    there = [pair for pair in pairs if {*pair} <= set(motions.columns)]
+    return [_direct(motions, *pair) for pair in there if pair[0] != "psi" or _counted(motions["psi"])]
 
 
 def _accelerations(motions: Motions) -> list[Relation]:
-    """Velocities with accelerometers, away from the centre of gravity only roughly."""
-    motion = {name: motions.small(name) for name in ("u", "v", "w", "p", "q", "r", "phi", "theta")}
-    u, v, w, p, q, r, phi, theta = (values for values, _ in motion.values())
-    gravity = (-np.sin(theta), np.sin(phi) * np.cos(theta), np.cos(phi) * np.cos(theta))
-    turned = (q * w - r * v, r * u - p * w, p * v - q * u)
+    """Velocities with accelerometers, which gravity's share of a small misalignment makes rough."""
+
+    def turned(m: Motions) -> tuple[np.ndarray, ...]:
+        u, v, w, p, q, r = (m[name] for name in ("u", "v", "w", "p", "q", "r"))
+        return q * w - r * v, r * u - p * w, p * v - q * u
+
     found = []
-    for i, (velocity, axis) in enumerate((("u", "ax"), ("v", "ay"), ("w", "az"))):
-        values, force = motions.measured(velocity), motions.measured(axis)
-        if values is not None and force is not None:
-            rate = force - turned[i] + GRAVITY * gravity[i]
-            found.append(Relation(velocity, f"{axis} less gravity and turning", values, rate, False, False))
+    for i, (velocity, force) in enumerate((("u", "ax"), ("v", "ay"), ("w", "az"))):
+        if not {velocity, force} <= set(motions.columns):
+            continue
+
+        def rate(m: Motions, i: int = i, force: str = force) -> np.ndarray:
+            return m[force] - turned(m)[i] + GRAVITY * _axes(m, 2)[i]
+
+        def arms(m: Motions, i: int = i) -> np.ndarray:
+            p, q, r = (m[name] for name in ("p", "q", "r"))
+            return np.array([[0.0 * p, r, -q], [-r, 0.0 * p, p], [q, -p, 0.0 * p]][i])
+
+        among = _among(motions, velocity, force, "u", "v", "w", "p", "q", "r", "phi", "theta")
+        partner = f"{force} less gravity and turning"
+        found.append(Relation(velocity, partner, rate, among, False, False, arms, np.inf))
     return found
+
+
+def _among(motions: Motions, *names: str) -> frozenset[str]:
+    return frozenset(name for name in names if name in motions.columns)
+
+
+def _counted(angle: np.ndarray) -> bool:
+    """Whether the turns of an angle are counted, so that its changes are known."""
+    return float(np.max(np.abs(np.diff(angle[np.isfinite(angle)])), initial=0.0)) <= np.pi
 
 
 def _away_from_zero(cosine: np.ndarray) -> np.ndarray:

@@ -14,6 +14,8 @@ _SIGMAS = 10.0
 _QUANTA = 10.0
 _RETURN = 0.6  # the lesser of rise and fall over the larger: what falls slower is the answer to a push
 _FEW = 0.02  # of the samples: more are how the channel is
+_SHARE = 0.05  # of the usual range: where the noise is unknown, less counts for little in a fit
+_BEYOND = 3.0  # times the usual range of a held input
 _WIDTHS = (1, 2)  # rows that a spike may last
 
 
@@ -21,13 +23,16 @@ def spikes(recording: Recording, channel: Channel, values: np.ndarray, body: boo
     """`values` (samples,) without spikes, and a warning.
 
     A spike leaves the samples before and after it, on one side, by more than 8 robust standard deviations and 4 times
-    the 95th percentile of the channel's differences, 10 σ of its sensor and 10 steps of its resolution. A step does not
-    come back, so it is none. A measured spike is masked, a prescribed one interpolated; of a held input, which may be
-    a pulse, nothing is said.
+    the 95th percentile of the channel's differences, 10 σ of its sensor, or 5 % of its usual range where σ is not
+    known, and 10 steps of its resolution. A step does not come back, so it is none. A measured spike is masked, a
+    prescribed one interpolated. A held input may be a pulse: a value of one row is named if it lies three times the
+    usual range beyond it, and kept.
     """
     rows = np.flatnonzero(np.isfinite(values))
-    if channel.role == "held input" or rows.size < 20:
+    if rows.size < 20:
         return values, []
+    if channel.role == "held input":
+        return values, _input_spikes(recording, channel, values)
     there = values[rows]
     chosen_rows, typical = _found(there, channel.sigma, body and channel.quantity in ANGLES)
     if not chosen_rows.size:
@@ -46,6 +51,28 @@ def spikes(recording: Recording, channel: Channel, values: np.ndarray, body: boo
     return np.where(chosen, np.nan if channel.role == "measured" else around, values), [finding]
 
 
+def _input_spikes(recording: Recording, channel: Channel, values: np.ndarray) -> list[Finding]:
+    """A warning of single rows far outside of what a held input does otherwise; none where it rests otherwise."""
+    low, high = np.nanpercentile(values, (1.0, 99.0))
+    reach = float(high - low)
+    far = (values > high + _BEYOND * reach) | (values < low - _BEYOND * reach)
+    single = far & ~np.roll(far, 1) & ~np.roll(far, -1)
+    if reach <= 0.0 or not single.any() or not np.array_equal(single, far) or single.mean() > 0.01:
+        return []
+    worst = float(values[far][np.argmax(np.abs(values[far]))])
+    what = (
+        f"{counted(far, values)} kept, though far outside of {amount(low)} to {amount(high, channel.unit)},"
+        f" such as {amount(worst, channel.unit)}: spikes?"
+    )
+    remedy = "replace them by the value before if the actuator did not do that"
+    return [at_rows("spike", "warning", recording, channel, far, what, remedy)]
+
+
+def _usual_range(values: np.ndarray) -> float:
+    low, high = np.percentile(values, (1.0, 99.0))
+    return float(high - low)
+
+
 def _found(values: np.ndarray, sigma: float, angle: bool) -> tuple[np.ndarray, float]:
     """Indices of the spikes among `values` (n,), and the usual size of its differences."""
     differences = _short_way(np.diff(values), angle)
@@ -56,7 +83,8 @@ def _found(values: np.ndarray, sigma: float, angle: bool) -> tuple[np.ndarray, f
         return np.array([], int), 0.0
     quantum = float(moving.min()) if moving.size < 0.5 * size.size else 0.0
     usual = float(np.percentile(size, 95.0))
-    limit = max(_DEVIATIONS * deviation, _USUAL * usual, _SIGMAS * sigma, _QUANTA * quantum)
+    least = _SIGMAS * sigma if sigma else _SHARE * _usual_range(values)
+    limit = max(_DEVIATIONS * deviation, _USUAL * usual, least, _QUANTA * quantum)
     chosen = np.zeros(values.shape, bool)
     # at the ends there is one side alone, on which a step looks the same
     for width in _WIDTHS:

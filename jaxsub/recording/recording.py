@@ -11,6 +11,7 @@ from jaxsub.findings import Finding
 from jaxsub.units import TIME, UnknownUnit, check_time_unit, column_unit, from_si, si_unit
 
 FIRST_ROW = 2  # in a file the header is row 1
+_LISTED = 5  # further rows of an error
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +135,25 @@ class Recording:
             raise InputError(self.source, f"has {times.size} samples", "a recording needs at least two")
         if (row := self._first(~np.isfinite(times))) is not None:
             raise InputError(f"{self.source}, row {row}", "the time is missing or not finite", "give every row a time")
-        if (row := self._first(times[1:] <= times[:-1])) is not None:
-            before, after = times[row - self.first_row :][:2]
-            what = f"time {after} s does not come after {before} s"
-            raise InputError(f"{self.source}, row {row + 1}", what, "times must increase from row to row")
+        steps = np.diff(times)
+        if (steps <= 0.0).any():
+            raise self._disorder(steps)
+
+    def _disorder(self, steps: np.ndarray) -> InputError:
+        """The error of rows whose times do not increase: the first in full, all counted, some more listed."""
+        wrong = np.flatnonzero(steps <= 0.0)
+        first = int(wrong[0])
+        what = f"time {self.times[first + 1]} s does not come after {self.times[first]} s"
+        if wrong.size > 1:
+            repeated = int(np.count_nonzero(steps[wrong] == 0.0))
+            listed = ", ".join(str(self.first_row + 1 + int(row)) for row in wrong[1 : 1 + _LISTED])
+            more = f" and {wrong.size - 1 - _LISTED} more" if wrong.size > 1 + _LISTED else ""
+            what += (
+                f"; of {wrong.size} such rows {repeated} repeat the time before and {wrong.size - repeated} go back:"
+                f" also rows {listed}{more}"
+            )
+        where = f"{self.source}, row {self.first_row + 1 + first}"
+        return InputError(where, what, "times must increase from row to row")
 
 
 def check_column(source: str, first_row: int, times: np.ndarray, name: str, values: np.ndarray) -> None:
