@@ -143,7 +143,7 @@ def _row(finding: Finding) -> tuple[str, ...]:
     return (finding.severity, finding.check, finding.where, finding.channel, *spans, " ".join(text.split()))
 
 
-def _spans(pairs: Sequence[tuple[float, float]]) -> str:
+def _spans(pairs: Sequence[tuple[int, int]] | Sequence[tuple[float, float]]) -> str:
     shown = [f"{a:.7g}" if a == b else f"{a:.7g} to {b:.7g}" for a, b in pairs[:3]]
     more = [f"{len(pairs) - 3} more"] if len(pairs) > 3 else []
     return ", ".join([*shown, *more])
