@@ -18,7 +18,7 @@ def draw(results: dict[str, Any]) -> bytes:
     rows = -(-len(found) // _COLUMNS)
     figure = plt.figure(figsize=(11.0, 2.1 * rows + 0.7), layout="constrained")
     grid = figure.subplots(rows, _COLUMNS, squeeze=False).flat
-    for axes, (name, one) in zip(grid, found.items(), strict=False):
+    for (name, one), axes in zip(found.items(), grid, strict=False):
         places = range(len(one["sizes"]))
         axes.axhline(rate, color=_FALSE, linewidth=1.0, label="clean runs with any alarm")
         axes.plot(places, one["named"], "o-", color=_NAMED, markersize=4, label="fault named")
