@@ -47,7 +47,7 @@ def contradiction(recording: Recording, relation: Relation, found: Comparison) -
     """The finding of sides that have little in common, for which no single fault accounts."""
     ratio = float(np.nanmedian(found.integrals / np.maximum(found.changes, 1e-300)))
     what = f"the rate of {relation.channel} and {relation.partner} have little in common: distance "
-    what += f"{found.distance:.2g} (0 where equal, limit {UNLIKE})"
+    what += f"{float(np.nanmin(found.distances)):.2g} (0 where equal, limit {UNLIKE})"
     if max(ratio, 1.0 / max(ratio, 1e-9)) > _STILL:
         sides = (relation.partner, relation.channel)
         still, moving = sides if ratio < 1.0 else sides[::-1]
