@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Sequence
 
+import jax
 import numpy as np
 
 from ..recording import Recording
@@ -15,7 +16,8 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     """The recordings as the batch that `vehicle` takes, with as many integration steps a sample as it needs."""
     layout = vehicle.layout
     check_units(layout, recordings)
-    rates = np.linalg.solve(np.asarray(vehicle.mass_matrix()), np.asarray(vehicle.damping_matrix()))
+    plain = jax.tree.map(np.asarray, vehicle)
+    rates = np.linalg.solve(plain.mass_matrix(), plain.damping_matrix())
     fastest = float(np.max(np.abs(np.linalg.eigvals(rates))))
     longest = max(float(np.diff(r.times).max()) for r in recordings)
     # linear damping is exact at any step; effects that replace it have the same rate and are not

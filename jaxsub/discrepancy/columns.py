@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from ..arrays import Values, quietly
 from ..effects import (
     AbstractActuator,
     AbstractEffect,
@@ -19,7 +19,8 @@ from ..effects import (
     Motion,
     amplitudes,
     numbers,
-    with_memory,
+    stacked,
+    with_memories,
     with_numbers,
 )
 from ..likelihood import Columns
@@ -36,7 +37,7 @@ def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple
     An effect with amplitudes has a column for each. One with none, such as a lag, enters as the whole difference that
     it makes at its grid value, and the difference that a little more of it would make.
     """
-    made = [_effect_columns(view, effect) for effect in candidates]
+    made = _effect_columns(view, candidates)
     shows = [isinstance(effect, AbstractInstrument) for effect in candidates]
     of_sort = lambda shown: [c for own, kind in zip(made, shows, strict=True) if kind is shown for c in own]
     forces, outputs = of_sort(False), of_sort(True)
@@ -50,10 +51,10 @@ def force_columns(view: View, forces: Sequence[np.ndarray]) -> Columns:
     """Columns of generalised forces given at both ends of each interval, (2, R, K-1, n) each."""
     system = view.followed.system
     if not forces:
-        return Columns(jnp.zeros((*system.C.shape[:3], 0)), jnp.zeros((*system.A.shape[:3], 0)))
-    ends = jnp.asarray(np.stack(forces, axis=-1))
-    forcing = system.G @ jnp.concatenate([ends[0], ends[1]], axis=2)
-    return Columns(jnp.zeros((*system.C.shape[:3], len(forces))), forcing)
+        return Columns(np.zeros((*system.C.shape[:3], 0)), np.zeros((*system.A.shape[:3], 0)))
+    begin, end = np.stack(forces, axis=-1)
+    forcing = np.asarray(system.G) @ np.concatenate([begin, end], axis=2)
+    return Columns(np.zeros((*system.C.shape[:3], len(forces))), forcing)
 
 
 def output_columns(view: View, outputs: Sequence[np.ndarray]) -> Columns:
@@ -61,38 +62,49 @@ def output_columns(view: View, outputs: Sequence[np.ndarray]) -> Columns:
     system = view.followed.system
     if not outputs:
         return force_columns(view, [])
-    shown = jnp.asarray(np.stack(outputs, axis=-1)) / view.sigma[:, None]
-    shown = jnp.where(system.measured[..., None], shown, 0.0)
-    return Columns(shown, jnp.zeros((*system.A.shape[:3], len(outputs))))
+    shown = np.stack(outputs, axis=-1) / np.asarray(view.sigma)[:, None]
+    shown = np.where(np.asarray(system.measured)[..., None], shown, 0.0)
+    return Columns(shown, np.zeros((*system.A.shape[:3], len(outputs))))
 
 
-def _effect_columns(view: View, effect: AbstractEffect) -> list[np.ndarray]:
-    """Each column of an effect, a force or a change of the channels."""
-    names = amplitudes(effect)
-    if names:
+def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[np.ndarray]]:
+    """Each column of each effect, a force or a change of the channels."""
+    tried = []
+    for effect in effects:
+        names = amplitudes(effect)
+        more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
         units = [with_numbers(effect, {name: float(name == own) for name in names}) for own in names]
-        return [difference(view, unit) for unit in units]
-    at = difference(view, effect)
-    more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
-    return [at, (difference(view, with_numbers(effect, more)) - at) / _NUDGE]
+        tried.append(units or [effect, with_numbers(effect, more)])
+    made = iter(differences(view, [one for own in tried for one in own]))
+    columns = []
+    for effect, own in zip(effects, tried, strict=True):
+        found = [next(made) for _ in own]
+        columns.append(found if amplitudes(effect) else [found[0], (found[1] - found[0]) / _NUDGE])
+    return columns
 
 
-def difference(view: View, effect: AbstractEffect) -> np.ndarray:
-    """What an effect as it stands adds: a force (2, R, K-1, n), or to the channels (R, K, c)."""
+@quietly
+def differences(view: View, effects: Sequence[AbstractEffect]) -> list[np.ndarray]:
+    """What each of `effects` as it stands adds: a force (2, R, K-1, n), or to the channels (R, K, c)."""
     vehicle, path = view.vehicle, view.path
-    if isinstance(effect, AbstractActuator):
-        return actuator_force(vehicle, path, effect)
-    if isinstance(effect, AbstractForce):
-        ends = (path.start, path.end)
-        if isinstance(effect, AbstractMemory):
-            ends = with_memory(effect, *ends, path.steps)
-        return np.stack([stacked_force(vehicle, effect, motion) for motion in ends])
-    assert isinstance(effect, AbstractInstrument)
-    channels = vehicle.layout.channels
-    change = np.zeros((*path.times.shape, len(channels)))
-    for channel, part in sensor_changes(path, effect).items():
-        change[..., channels.index(channel)] = part
-    return change
+    forces = iter(actuator_forces(vehicle, path, [e for e in effects if isinstance(e, AbstractActuator)]))
+    memories = [effect for effect in effects if isinstance(effect, AbstractMemory)]
+    remembered = iter(with_memories(memories, path.start, path.end, path.steps))
+
+    def added(effect: AbstractEffect) -> np.ndarray:
+        if isinstance(effect, AbstractActuator):
+            return next(forces)
+        if isinstance(effect, AbstractForce):
+            ends = next(remembered) if isinstance(effect, AbstractMemory) else (path.start, path.end)
+            return np.stack([stacked_force(vehicle, effect, motion) for motion in ends])
+        assert isinstance(effect, AbstractInstrument)
+        channels = vehicle.layout.channels
+        change = np.zeros((*path.times.shape, len(channels)))
+        for channel, part in sensor_changes(path, effect).items():
+            change[..., channels.index(channel)] = part
+        return change
+
+    return [added(effect) for effect in effects]
 
 
 def stacked_force(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motion) -> np.ndarray:
@@ -103,19 +115,29 @@ def stacked_force(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motio
     return np.stack([np.broadcast_to(parts.get(e, 0.0), like.shape) for e in vehicle.layout.equations], axis=-1)
 
 
-def actuator_force(vehicle: AbstractVehicle, path: Trajectory, effect: AbstractActuator) -> np.ndarray:
-    """The force that a changed actuator adds, as the line over each interval with the same mean and slope."""
-    column = [name for name, _ in vehicle.layout.inputs].index(effect.actuator)
+def actuator_forces(
+    vehicle: AbstractVehicle, path: Trajectory, effects: Sequence[AbstractActuator]
+) -> list[np.ndarray]:
+    """The force that each changed actuator adds, as the line over each interval with the same mean and slope."""
+    inputs = [name for name, _ in vehicle.layout.inputs]
     # which actuator it is makes no difference to how it responds, and would make one to the compiler
-    nameless = dataclasses.replace(effect, actuator="")
-    after = np.asarray(_respond(nameless, jnp.asarray(path.times), jnp.asarray(path.nodes[..., column])))
-    start, middle, end = np.moveaxis(after, -1, 0)
-    mean, slope = (start + 4.0 * middle + end) / 6.0, end - start
-    ends = []
-    for motion, value in ((path.start, mean - 0.5 * slope), (path.end, mean + 0.5 * slope)):
-        changed = eqx.tree_at(lambda m: m.actuators[effect.actuator], motion, value)
-        ends.append(np.asarray(_force(vehicle, changed)) - np.asarray(_force(vehicle, motion)))
-    return np.stack(ends)
+    alike = stacked([dataclasses.replace(effect, actuator="") for effect in effects])
+    commands = [np.stack([path.nodes[..., inputs.index(effects[i].actuator)] for i in own]) for own, _ in alike]
+    after = _respond([stack for _, stack in alike], path.times, commands) if alike else []
+    found: dict[int, np.ndarray] = {}
+    for (own, _), nodes in zip(alike, after, strict=True):
+        found |= dict(zip(own, np.asarray(nodes), strict=True))
+    ends = [(motion, np.asarray(_force(vehicle, motion))) for motion in (path.start, path.end)] if alike else []
+    forces = []
+    for i, effect in enumerate(effects):
+        start, middle, end = np.moveaxis(found[i], -1, 0)
+        mean, slope = (start + 4.0 * middle + end) / 6.0, end - start
+        added = []
+        for (motion, force), value in zip(ends, (mean - 0.5 * slope, mean + 0.5 * slope), strict=True):
+            changed = eqx.tree_at(lambda m, name=effect.actuator: m.actuators[name], motion, value)
+            added.append(np.asarray(_force(vehicle, changed)) - force)
+        forces.append(np.stack(added))
+    return forces
 
 
 @eqx.filter_jit
@@ -124,8 +146,10 @@ def _force(vehicle: AbstractVehicle, motion: Motion) -> Array:
 
 
 @eqx.filter_jit
-def _respond(effect: AbstractActuator, times: Array, nodes: Array) -> Array:
-    return jax.vmap(effect.respond)(times, nodes)
+def _respond(stacks: list[AbstractActuator], times: Values, nodes: Sequence[Values]) -> list[Array]:
+    """What the actuators of each stack do at their `nodes` (N, R, K-1, 3), one program for all of them."""
+    one = lambda effect, nodes: jax.vmap(effect.respond)(times, nodes)
+    return [jax.vmap(one)(stack, own) for stack, own in zip(stacks, nodes, strict=True)]
 
 
 def plausible(view: View, effect: AbstractEffect) -> bool:
@@ -150,5 +174,6 @@ def plausible(view: View, effect: AbstractEffect) -> bool:
 
 def sensor_changes(path: Trajectory, effect: AbstractInstrument) -> dict[str, np.ndarray]:
     """What a sensor effect changes in each of its channels, (R, K)."""
-    shown = effect.show(jnp.asarray(path.times), path.true, path.seen)
+    plain = jax.tree.map(np.asarray, effect)
+    shown = plain.show(path.times, path.true, path.seen)
     return {channel: np.asarray(part) - path.true[channel] for channel, part in shown.items()}

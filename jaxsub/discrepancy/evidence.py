@@ -16,22 +16,18 @@ import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 from scipy.linalg import block_diag
 
 from ..estimate import estimate_disturbance
-from ..likelihood import Columns, Disturbance, System, part_products
+from ..likelihood import Columns, Disturbance
 from .columns import force_columns
-from .view import View, lengths
+from .leading import root_or_one
+from .view import View
 
 # columns that a chosen set may have: the program for its disturbance then has one shape
 SLOTS = 8
-# parts of the recordings, each to be predicted from the others
-_PARTS = 4
 # shares of the disturbance that the model without candidates asks for: what was left out may be part or all of it
 _SHARES = (1.0, 0.1, 0.003)
 # products that evidence begins with
@@ -109,6 +105,11 @@ class Products:
         candidates = len(self.gram) - self.known
         return self._of(np.asarray(block_diag(keep, np.eye(candidates))), keep.shape[1])
 
+    def scaled(self, length: np.ndarray) -> "Products":
+        """With every column divided by its `length`."""
+        over = np.outer(length, length)
+        return dataclasses.replace(self, gram=self.gram / over, parts=self.parts / over)
+
     def _of(self, sums: np.ndarray, known: int) -> "Products":
         gram, parts = sums.T @ self.gram @ sums, sums.T @ self.parts @ sums
         return dataclasses.replace(self, gram=gram, parts=parts, known=known)
@@ -176,26 +177,24 @@ class Evidence:
     @classmethod
     def of(cls, view: View, columns: Columns, disturbances: Sequence[Disturbance] = ()) -> "Evidence":
         """Under the given disturbances, or shares of the view's."""
-        length = lengths(view.disturbance, view.followed.system, columns)
-        scaled = jax.tree.map(lambda column: column / length, columns)
-        made = cls(view, view.base + scaled, np.asarray(length), [])
-        own = view.disturbance
-        shares = [dataclasses.replace(own, force=share * own.force) for share in _SHARES]
+        own, known = view.disturbance, len(view.prior)
+        first = cls(view, view.base + columns, np.ones(columns.shown.shape[-1]), []).under(own)
+        length = root_or_one(np.diag(first.gram)[known:])
+        made = cls(view, view.base + jax.tree.map(lambda column: column / length, columns), length, [])
+        shares = [own, *(dataclasses.replace(own, force=share * own.force) for share in _SHARES[1:])]
         for disturbance in disturbances or shares:
-            made.products.append(made.under(disturbance))
+            known_already = first.scaled(np.concatenate([np.ones(known), length])) if disturbance is own else None
+            made.products.append(known_already or made.under(disturbance))
         return made
 
     def under(self, disturbance: Disturbance) -> Products:
         """The products under a disturbance."""
         view = self.view
-        system = view.followed.system
-        pieces = max(1, -(-_PARTS // len(system.measured)))
-        found, spreads = _parts(disturbance, system, self.whole, pieces)
-        parts, known = np.asarray(found), len(view.prior)
-        gram = parts.sum(axis=0)
-        gram[:known, :known] += np.asarray(view.prior)
-        samples = int(np.sum(np.asarray(system.measured)))
-        return Products(disturbance, gram, np.asarray(spreads), samples, known, parts)
+        parts, spreads = view.products(self.whole, disturbance)
+        gram, known = parts.sum(axis=0), len(view.prior)
+        gram[:known, :known] += view.prior
+        samples = int(np.sum(np.asarray(view.followed.system.measured)))
+        return Products(disturbance, gram, spreads, samples, known, parts)
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Evidence":
         """Of a view along the same path whose residual and free parameters are sums `keep` (1 + p, 1 + m) of these."""
@@ -206,13 +205,12 @@ class Evidence:
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
         picked = self.picked([*chosen, *[0] * (SLOTS - len(chosen))])
-        filled = jnp.arange(SLOTS) < len(chosen)
-        picked = jax.tree.map(lambda column: jnp.where(filled, column, 0.0), picked)
-        samples = float(np.sum(np.asarray(self.view.followed.system.measured)))
-        worth = jnp.where(filled, 1.0 / samples, 1.0)
-        prior = jax.scipy.linalg.block_diag(self.view.prior, jnp.diag(worth))
+        filled = np.arange(SLOTS) < len(chosen)
+        picked = jax.tree.map(lambda column: np.where(filled, column, 0.0), picked)
+        worth = np.where(filled, 1.0 / self.products[0].samples, 1.0)
+        prior = np.asarray(block_diag(self.view.prior, np.diag(worth)))
         found = estimate_disturbance(self.view.followed.system, self.view.base + picked, prior, start)
-        return self.under(found)
+        return self.under(jax.tree.map(np.asarray, found))
 
     def left(self, chosen: Sequence[int], products: Products) -> Columns:
         """The residual, less what free parameters and `chosen` take up of it according to `products`."""
@@ -229,15 +227,6 @@ class Evidence:
         values = [products.log_evidence(chosen) for products in self.products]
         best = int(np.argmax(values))
         return values[best], self.products[best]
-
-
-@eqx.filter_jit
-def _parts(
-    disturbance: Disturbance, system: System, columns: Columns, pieces: int
-) -> tuple[Float[Array, "m q q"], Float[Array, " m"]]:
-    """Products of all columns whitened in `pieces` of every run, and half the log-determinant of each."""
-    found, spreads = part_products(disturbance, system, columns, pieces)
-    return found.reshape(-1, *found.shape[2:]), spreads.reshape(-1)
 
 
 def evidence_of(view: View) -> float:

@@ -8,7 +8,6 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
-import jax
 import numpy as np
 from scipy import special
 
@@ -102,12 +101,11 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     left = chosen.left(columns, under[-1])
     mean, _ = smoothed(under[-1].disturbance, view.followed.system, left)
     weighed = promising(view, forces, np.asarray(mean))
-    drawn = force_columns(view, [column for force in weighed for column in hats(view, force, FINE)])
     asked = [dataclasses.replace(p.disturbance, force=share * p.disturbance.force) for p in under for share in _SHARES]
     # one force after the other: nobody asks for products of one's hats with another's
-    of = lambda own: jax.tree.map(lambda column: column[..., np.array(own)], drawn)
-    owned = [chosen.picked(columns) + of(own) for own in _owners(weighed, 0, FINE)]
-    every = [_Weighed(Evidence.of(view, own, asked), len(columns)) for own in owned]
+    picked = chosen.picked(columns)
+    of = lambda force: Evidence.of(view, picked + force_columns(view, hats(view, force, FINE)), asked)
+    every = [_Weighed(found.products, found.length[len(columns) :], len(columns)) for found in map(of, weighed)]
     values = [each.values(each.held) for each in every]
     best = int(np.argmax([np.max(each) for each in values]))
     found, at = every[best], int(np.argmax(values[best]))
@@ -123,9 +121,12 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
 
 @dataclasses.dataclass(frozen=True)
 class _Weighed:
-    """Evidence of the chosen columns, which are the first `count`, and of one force's hats."""
+    """Products of the chosen columns, which are the first `count`, and of one force's hats, whose `length` (FINE,) is
+    that of their columns.
+    """
 
-    evidence: Evidence
+    products: Sequence[Products]
+    length: np.ndarray
     count: int
 
     @property
@@ -141,22 +142,17 @@ class _Weighed:
     @property
     def samples(self) -> int:
         """How many."""
-        return self.evidence.products[0].samples
+        return self.products[0].samples
 
     @property
     def before(self) -> float:
         """Log evidence of what was chosen."""
-        return self.evidence.best(self.held)[0]
-
-    @property
-    def length(self) -> np.ndarray:
-        """(FINE,) of the hats' columns."""
-        return self.evidence.length[self.own]
+        return max(products.log_evidence(self.held) for products in self.products)
 
     def values(self, held: list[int]) -> np.ndarray:
         """Log evidence with the force more than the columns `held`, under each disturbance."""
         gain = lambda p: smoothest(p, held, self.own, self.length).gain
-        return np.array([p.log_evidence(held) + gain(p) for p in self.evidence.products])
+        return np.array([p.log_evidence(held) + gain(p) for p in self.products])
 
     def together(self, products: Products) -> tuple[Products, Smooth]:
         """Products of what was chosen and of the columns of the force's prior, and the smooth function of these."""
@@ -165,13 +161,12 @@ class _Weighed:
 
     def predicts(self) -> bool:
         """Whether parts of the recordings are better predicted with the force, each under what suits it."""
-        products = self.evidence.products
-        with_it = max(float(np.sum(self.together(p)[0].predicted([*self.held, *self.own]))) for p in products)
-        return with_it > max(float(np.sum(p.predicted(self.held))) for p in products)
+        with_it = max(float(np.sum(self.together(p)[0].predicted([*self.held, *self.own]))) for p in self.products)
+        return with_it > max(float(np.sum(p.predicted(self.held))) for p in self.products)
 
     def heights(self, at: int) -> tuple[np.ndarray, float, float]:
         """Of the force, how far from zero they are before the data, and of what all explain the chosen's share."""
-        both, smooth = self.together(self.evidence.products[at])
+        both, smooth = self.together(self.products[at])
         gains = both.gains(self.held, [self.own])
         fall = both.fall(self.held)
         explained = fall / max(fall + float(gains.statistic[0]), 1e-300)
@@ -180,7 +175,7 @@ class _Weighed:
 
     def nearest(self, at: int, force: SmoothForce, heights: np.ndarray) -> tuple[SmoothForce, float]:
         """The force with the numbers that are nearest to `heights` along the motion, and how near they are."""
-        G, _ = self.evidence.products[at].remaining(self.held, self.own)
+        G, _ = self.products[at].remaining(self.held, self.own)
         G = G * np.outer(self.length, self.length)
         C, told = coarse(), float(heights @ G @ heights)
         # knots where nothing moved follow their neighbours' heights

@@ -6,12 +6,12 @@ from functools import cached_property
 from typing import TypeVar
 
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
+from ..arrays import quietly
 from ..estimate import Fit, Problem, estimate_disturbance
-from ..likelihood import Columns, Disturbance, Followed, follow, products, restricted_of
+from ..likelihood import Columns, Disturbance, Followed, follow
 from ..vehicle import AbstractVehicle
 
 # what dampens a scoring step, of a column's squares, and shares of a change of the disturbance, one after the other
@@ -29,6 +29,8 @@ _ABOUT = 10.0
 class At:
     """The runs followed by a vehicle under a disturbance, its columns of unit length, their priors, and the lengths.
 
+    Columns and what is made of them are NumPy arrays: their algebra is small, and worth no program.
+
     `gram` are the columns' products, priors included, and `spread` half the log-determinant of the covariance; `tame`
     is the number of the damping by which a step led here.
     """
@@ -37,16 +39,22 @@ class At:
     disturbance: Disturbance
     followed: Followed
     base: Columns
-    prior: Array
-    length: np.ndarray
-    gram: np.ndarray
+    prior: Float[np.ndarray, "p1 p1"]
+    length: Float[np.ndarray, " p"]
+    gram: Float[np.ndarray, "p1 p1"]
     spread: float
     tame: int = 0
 
     @cached_property
+    @quietly
     def cost(self) -> float:
-        """Minus the log restricted likelihood."""
-        return float(restricted_of(jnp.asarray(self.gram), self.spread))
+        """Minus the log restricted likelihood; no number where the columns' products are not positive definite."""
+        among, across = self.gram[1:, 1:], self.gram[1:, 0]
+        sign, logarithm = np.linalg.slogdet(among)
+        if not sign > 0.0:
+            return np.nan
+        left = self.gram[0, 0] - across @ np.linalg.solve(among, across)
+        return self.spread + 0.5 * float(logarithm + left)
 
     @property
     def as_they_are(self) -> float:
@@ -61,25 +69,24 @@ class Led:
     problem: Problem
     start: Array
 
+    @quietly
     def at(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> At:
         """With the residual's and the parameters' columns in units in which each of the latter is of length one."""
         problem, names = self.problem, [row.name for row in vehicle.layout.free]
+        disturbance = jax.tree.map(np.asarray, disturbance)
         followed = follow(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.spread)
-        columns = followed.residual + followed.theta
-        known = len(names) + 1
-        found, spread = products(disturbance, followed.system, columns, jnp.zeros((known, known)))
-        squares = jnp.diag(found)[1:]
-        length = jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
-        unit = jnp.concatenate([jnp.ones(1), length])
+        found = np.asarray(followed.products)
+        length = root_or_one(np.diag(found)[1:])
+        unit = np.concatenate([np.ones(1), length])
         values = vehicle.values()
-        away = problem.prior_mean - jnp.asarray([float(values[name]) for name in names])
-        pulled = jnp.column_stack([away, jnp.diag(1.0 / length)]) / problem.prior_std[:, None]
-        untold = jnp.full(known, _UNTOLD).at[0].set(0.0)
-        prior = pulled.T @ pulled + jnp.diag(untold)
-        base = jax.tree.map(lambda column: column / unit, columns)
-        gram = np.asarray(found / jnp.outer(unit, unit) + prior)
-        return At(vehicle, disturbance, followed, base, prior, np.asarray(length), gram, float(spread))
+        away = np.asarray(problem.prior_mean) - np.array([float(values[name]) for name in names])
+        pulled = np.column_stack([away, np.diag(1.0 / length)]) / np.asarray(problem.prior_std)[:, None]
+        prior = pulled.T @ pulled + np.diag([0.0, *[_UNTOLD] * len(names)])
+        base = jax.tree.map(lambda a, b: np.concatenate([a, b], axis=-1) / unit, followed.residual, followed.theta)
+        gram = found / np.outer(unit, unit) + prior
+        return At(vehicle, disturbance, followed, base, prior, length, gram, float(followed.spread))
 
+    @quietly
     def descend(self, at: At) -> At:
         """Where a scoring step leads, or one that is damped (Levenberg 1944), within the bounds of each number; no step
         where none makes the recordings more probable. The first that is tried is damped a little less than the last.
@@ -89,7 +96,7 @@ class Led:
         low, high = (np.array([(row.lower, row.upper) for row in rows]).reshape(-1, 2).T - here) * at.length
         for tame in range(max(at.tame - 1, 0), len(_DAMPED)):
             moved = here + _step(at.gram, _DAMPED[tame], low, high) / at.length
-            named = {row.name: jnp.asarray(value) for row, value in zip(rows, moved, strict=True)}
+            named = {row.name: np.asarray(value) for row, value in zip(rows, moved, strict=True)}
             trial = self.at(at.vehicle.with_values(named), at.disturbance)
             if trial.as_they_are < at.as_they_are:
                 return dataclasses.replace(trial, tame=tame)
@@ -111,13 +118,17 @@ def _step(gram: np.ndarray, damped: float, low: np.ndarray, high: np.ndarray) ->
     return lsq_linear(factor.T, np.linalg.solve(factor, gram[1:, 0]), (low, high), method="bvls").x
 
 
+def root_or_one(squares: Float[np.ndarray, " q"]) -> Float[np.ndarray, " q"]:
+    """Lengths of columns by their squares; one for an empty column."""
+    return np.where(squares > 0.0, np.sqrt(np.maximum(squares, 0.0)), 1.0)
+
+
 def of_order(problem: Problem) -> Problem:
     """A problem with a wide prior about each number of the file that has none."""
     vehicle, own = problem.vehicle, problem.vehicle.own_values()
-    width = _ABOUT * jnp.abs(problem.prior_mean)
-    given = jnp.array([row.name in own for row in vehicle.layout.free], bool)
-    wide = given & (width > 0.0) & jnp.isinf(problem.prior_std)
-    return dataclasses.replace(problem, prior_std=jnp.where(wide, width, problem.prior_std))
+    width, given = _ABOUT * np.abs(problem.prior_mean), [row.name in own for row in vehicle.layout.free]
+    wide = np.array(given, bool) & (width > 0.0) & np.isinf(problem.prior_std)
+    return dataclasses.replace(problem, prior_std=jax.device_put(np.where(wide, width, problem.prior_std)))
 
 
 Costed = TypeVar("Costed", Fit, At)
@@ -144,7 +155,8 @@ def _towards(at: At) -> Iterator[Disturbance]:
     """The disturbance that its numbers ask for, and one half as far."""
     found = estimate_disturbance(at.followed.system, at.base, at.prior, at.disturbance)
     for share in _SHARES:
-        yield jax.tree.map(lambda old, new, share=share: old * (new / old) ** share, at.disturbance, found)
+        towards = lambda old, new, share=share: old * (np.asarray(new) / old) ** share
+        yield jax.tree.map(towards, at.disturbance, found)
 
 
 def apart(found: Iterable[At]) -> list[At]:

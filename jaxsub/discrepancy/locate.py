@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, Motion, by_name, velocities
-from ..likelihood import Disturbance, products
+from ..likelihood import Disturbance
 from ..recording import Recording
-from .columns import difference, force_columns, output_columns
+from .columns import differences, force_columns, output_columns
 from .diagnosis import ForceTrace, Location, Regime
 from .evidence import Evidence
 from .process_noise import NoiseSignal
@@ -61,7 +61,7 @@ def shares(view: View, scan: Scan) -> dict[str, float]:
     whole = _likelihood(view, view.disturbance)
     found: dict[str, float] = {}
     for i, equation in enumerate(view.vehicle.layout.equations):
-        without = view.disturbance.force.at[i].multiply(1e-3)
+        without = np.where(np.arange(len(view.vehicle.layout.equations)) == i, 1e-3, 1.0) * view.disturbance.force
         found[equation] = max(0.0, whole - _likelihood(view, dataclasses.replace(view.disturbance, force=without)))
     for effect, statistic, right in zip(scan.effects, scan.statistic, scan.right, strict=True):
         for place in effect.where if right and isinstance(effect, AbstractInstrument | AbstractActuator) else ():
@@ -71,17 +71,17 @@ def shares(view: View, scan: Scan) -> dict[str, float]:
 
 
 def _likelihood(view: View, disturbance: Disturbance) -> float:
-    gram, spread = products(disturbance, view.followed.system, view.base, view.prior)
-    gram = np.asarray(gram)
-    return float(0.5 * gram[1:, 0] @ np.linalg.solve(gram[1:, 1:], gram[1:, 0]) - 0.5 * gram[0, 0] - spread)
+    parts, spreads = view.products(view.base, disturbance)
+    gram = np.sum(parts, axis=0) + view.prior
+    squares = gram[0, 0] - gram[1:, 0] @ np.linalg.solve(gram[1:, 1:], gram[1:, 0])
+    return -0.5 * float(squares) - float(np.sum(spreads))
 
 
 def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Disturbance) -> dict[str, float]:
     """How the trace of accepted effects divides among the equations, actuators and sensors they act on."""
     pushed, shown = [], []
     equations, channels = view.vehicle.layout.equations, view.vehicle.layout.channels
-    for effect in effects:
-        whole = difference(view, effect)
+    for effect, whole in zip(effects, differences(view, effects), strict=True):
         if isinstance(effect, AbstractInstrument):
             shown += [(f"sensor:{c}", whole * (np.asarray(channels) == c)) for c in effect.channels]
         elif isinstance(effect, AbstractActuator):

@@ -68,8 +68,8 @@ def sound(fit: Ended, effects: Sequence[AbstractEffect]) -> bool:
     A force whose memory is over within a sample is one without: what it then does, coefficients do. One whose memory
     outlasts the runs is a constant in each, as large as the run's initial state, which is found anew for each.
     """
-    labels, shortest = {effect.label for effect in effects}, float(np.min(fit.runs.steps))
-    longest = float(np.max(fit.runs.times))
+    labels, shortest = {effect.label for effect in effects}, float(np.min(np.asarray(fit.runs.steps)))
+    longest = float(np.max(np.asarray(fit.runs.times)))
     for effect in (e for e in fit.vehicle.effects if e.label in labels):
         found, linear, units = numbers(effect), amplitudes(effect), effect.units()
         times = {n for n in found if isinstance(effect, AbstractMemory) and units[n] == "s"}

@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..arrays import Values
 from ..effects import AbstractActuator
 from ..estimate import Fit
 from ..filter import (
@@ -101,7 +102,7 @@ def noise_signals(fit: Fit, recordings: Sequence[Recording], copies: int = 19) -
     if not (np.isfinite(clean).all() and np.isfinite(recorded).all() and lengths.min() > _SETTLED):
         return []
     ratios, threshold = calibrated(clean, recorded, lengths)
-    std = np.sqrt(recorded + np.asarray(floor(vehicle, fit.sigma)) ** 2)
+    std = np.sqrt(recorded + floor(vehicle, np.asarray(fit.sigma)) ** 2)
     signals = []
     for run, recording in enumerate(recordings):
         k, window = int(lengths[run]), _WINDOW * float(np.median(np.diff(recording.times)))
@@ -178,13 +179,13 @@ class Above(AbstractNoiseRule):
 def noise_filter(vehicle: AbstractVehicle, substeps: int, sigma: Float[Array, " c"]) -> ExtendedKalmanFilter:
     """The extended Kalman filter of a vehicle whose numbers are all known, with fuzzy noise above a constant one."""
     known = vehicle.holding(vehicle.values())
-    scale = state_scale(known, sigma)
+    scale = jnp.asarray(state_scale(known, sigma))
     constant = ConstantNoise(jnp.diag(_FLOOR * scale))
     rule = Above(constant, FuzzyNoise(_LEAST * scale, _MOST * scale, width=_WIDTH))
     return ExtendedKalmanFilter(VehicleProcess.of(known, substeps), rule, jnp.diag(sigma), jnp.diag(_VAGUE * scale))
 
 
-def floor(vehicle: AbstractVehicle, sigma: Float[Array, " c"]) -> Float[Array, " n"]:
+def floor(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values, " n"]:
     """Root of the constant density beneath the rule's, of each equation."""
     return _FLOOR * state_scale(vehicle, sigma)[: len(vehicle.layout.equations)]
 

@@ -5,7 +5,6 @@ import copy
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from scipy import special
 
@@ -61,7 +60,7 @@ class Selector:
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
         own = evidence.view.disturbance
         # a free run has no disturbance to put errors down to
-        still = Disturbance(_STILL * own.force, own.time, jnp.ones_like(own.noise))
+        still = Disturbance(_STILL * own.force, own.time, np.ones_like(own.noise))
         self.free = evidence.under(still)
         self.lost = False
         forms = collections.Counter(effect.name for effect in self.candidates)

@@ -50,7 +50,8 @@ def fastest(vehicle: AbstractVehicle, motion: Motion) -> float:
         return (force(moved(small)) - force(moved(-small))) / (2.0 * small)
 
     slopes = np.stack([slope(e) for e in equations], axis=-1)
-    return float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(np.asarray(vehicle.mass_matrix()), slopes)))))
+    inertia = jax.tree.map(np.asarray, vehicle).mass_matrix()
+    return float(np.max(np.abs(np.linalg.eigvals(np.linalg.solve(inertia, slopes)))))
 
 
 def substeps_for(vehicle: AbstractVehicle, runs: Runs, motion: Motion, most: float = _TOO_MUCH) -> int:

@@ -5,21 +5,21 @@ from collections.abc import Iterable
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..arrays import quietly
 from ..effects import Facts, Motion, wave_band
 from ..estimate import Fit, Problem
 from ..likelihood import (
     Columns,
     Disturbance,
     Followed,
+    Linearised,
     System,
     first_guess,
-    fitted,
+    part_products,
     smoothed,
-    whitened_squares,
 )
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
@@ -34,6 +34,8 @@ _DOUBTED = 3
 # of the forces that would explain all that is left: too small to lead a path, and large enough to grow from
 _QUIET = 1e-2
 _LEAST_WHITE = 1e-5
+# parts of the recordings, each to be predicted from the others
+_PARTS = 4
 
 
 class Trajectory(eqx.Module):
@@ -61,7 +63,7 @@ class Trajectory(eqx.Module):
     def of(cls, vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered: Array) -> "Trajectory":
         """Along states (R, K, s) expected and filtered."""
         found = _trajectory(vehicle, runs, expected, filtered)
-        steps = jnp.where(runs.live, runs.steps[runs.step_of], 0.0)
+        steps = np.where(runs.live, np.asarray(runs.steps)[np.asarray(runs.step_of)], 0.0)
         return cls(*(jax.tree.map(np.asarray, part) for part in (*found, runs.times, steps)))
 
 
@@ -95,13 +97,23 @@ class View:
     disturbance: Disturbance
     path: Trajectory
     base: Columns
-    prior: Float[Array, "p1 p1"]
+    prior: Float[np.ndarray, "p1 p1"]
     length: np.ndarray
 
     @property
     def finite(self) -> bool:
         """Whether the model could be led along all of the recordings, or diverged on the way."""
         return bool(np.all(np.isfinite(self.covariance)))
+
+    def products(
+        self, columns: Columns, disturbance: Disturbance
+    ) -> tuple[Float[np.ndarray, "m q q"], Float[np.ndarray, " m"]]:
+        """Products of `columns` whitened under a disturbance, in m parts of the recordings, and half the
+        log-determinant of each part's covariance.
+        """
+        system = self.followed.system
+        found, spreads = part_products(disturbance, system, columns, max(1, -(-_PARTS // len(system.measured))))
+        return found.reshape(-1, *found.shape[2:]), spreads.reshape(-1)
 
     def measured(self, channel: str) -> np.ndarray:
         """All samples that `channel` has in the recordings, SI."""
@@ -128,8 +140,7 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     problem, rms = of_order(fit.problem), fit.rms
     much = max(rms.values()) > _MUCH
     led = Led(problem, problem.guess if much else fit.start)
-    system = System.of(fit.model, fit.runs, fit.sigma, problem.spread)
-    guess = dataclasses.replace(first_guess(system, fit.residual), noise=_white(fit))
+    guess = dataclasses.replace(_guessed(fit.model, fit.runs, fit.sigma, problem.spread), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
     if much:
         vehicles += [file] if file is not None else []
@@ -155,6 +166,7 @@ def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: I
     return _seen(led, arrived(led, by_cost(led.at(vehicle, one) for one in disturbances)[0]))
 
 
+@quietly
 def _seen(led: Led, at: At) -> View:
     """What is seen from there."""
     runs, sigma = led.problem.runs, led.problem.sigma
@@ -167,27 +179,26 @@ def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturb
     """What a fit leaves, `rms` over sigma of each channel, put down to the noise of all channels; or of one that it
     leaves much in, and in the others to forces: for each such.
     """
-    noisy = jnp.maximum(guess.noise, rms)
-    alone = [jnp.where(own, noisy, guess.noise) for own in np.diag(rms > _MUCH) if own.any()]
-    every = Disturbance(_QUIET * guess.force, guess.time, noisy)
+    noisy = np.maximum(guess.noise, rms)
+    alone = [np.where(own, noisy, guess.noise) for own in np.diag(rms > _MUCH) if own.any()]
+    every = Disturbance(_QUIET * np.asarray(guess.force), guess.time, noisy)
     return every, [dataclasses.replace(guess, noise=noise) for noise in alone]
 
 
-def _white(fit: Fit) -> Array:
+@eqx.filter_jit
+def _guessed(model: Linearised, runs: Runs, sigma: Array, spread: Array) -> Disturbance:
+    """Where to look for the forces in what a fit leaves."""
+    return first_guess(System.of(model, runs, sigma, spread), model.error / sigma)
+
+
+def _white(fit: Fit) -> np.ndarray:
     """Where to look for the noise of each channel, in units of the fit's: what is white in its errors.
 
     A noise that the file leaves open is the whole misfit of a free run until now, which may be a thousand times larger.
     """
     white = record_sigma(np.asarray(fit.model.error), np.asarray(fit.runs.mask)) / np.asarray(fit.sigma)
     given = np.array([output.sigma is not None for output in fit.vehicle.layout.outputs])
-    return jnp.asarray(np.where(given, 1.0, np.clip(white, _LEAST_WHITE, 1.0)))
-
-
-@eqx.filter_jit
-def lengths(disturbance: Disturbance, system: System, columns: Columns) -> Float[Array, " q"]:
-    """The root of each column's whitened squares; one for an empty column."""
-    squares = whitened_squares(disturbance, system, columns)
-    return jnp.where(squares > 0.0, jnp.sqrt(squares), 1.0)
+    return np.where(given, 1.0, np.clip(white, _LEAST_WHITE, 1.0))
 
 
 def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndarray, "r k n"]]:
@@ -198,9 +209,9 @@ def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndar
 
 def _left(view: View) -> Columns:
     """The residual, less what the free parameters take up of it."""
-    weights = fitted(view.disturbance, view.followed.system, view.base, view.prior)
-    assert view.base.forcing is not None
-    return Columns((view.base.shown @ weights)[..., None], (view.base.forcing @ weights)[..., None])
+    gram = np.sum(view.products(view.base, view.disturbance)[0], axis=0) + view.prior
+    weights = np.array([1.0, *-np.linalg.solve(gram[1:, 1:], gram[1:, 0])])
+    return jax.tree.map(lambda column: (column @ weights)[..., None], view.base)
 
 
 def facts(view: View) -> Facts:

@@ -17,6 +17,7 @@ from .base import (
     options,
     parameter_table,
     shape,
+    stacked,
     with_numbers,
 )
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
@@ -26,7 +27,7 @@ from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, 
 from .hull_damping import CubicDamping, QuadraticDamping
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
 from .mechanisms import AsymmetricDamping, CoulombFriction, CubicStiffness, Saturation
-from .memory import AbstractMemory, FluidMemory, Hysteresis, with_memory
+from .memory import AbstractMemory, FluidMemory, Hysteresis, with_memories
 from .motion import (
     CHANNEL_UNITS,
     EQUATIONS,
@@ -125,11 +126,12 @@ __all__ = [
     "options",
     "parameter_table",
     "shape",
+    "stacked",
     "unit_per",
     "variables",
     "velocities",
     "vocabulary",
     "wave_band",
-    "with_memory",
+    "with_memories",
     "with_numbers",
 ]

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import equinox as eqx
+import jax
+import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from ..errors import InputError
@@ -163,8 +165,8 @@ class AbstractInstrument(AbstractEffect):
 
     @abc.abstractmethod
     def show(
-        self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
-    ) -> dict[str, Float[Array, " *k"]]:
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> dict[str, Float[Signal, " *k"]]:
         """What each of its `channels` shows at `times` (s from the run's start), given the `outputs` without it.
 
         Leading axes of `outputs` and `motion` follow those of `times`, the last of which is time.
@@ -185,7 +187,9 @@ class AbstractSensor(AbstractInstrument):
     remembers: ClassVar[bool] = False
 
     @abc.abstractmethod
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+    def measure(
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> Float[Signal, " *k"]:
         """What `show` says of the channel."""
 
     @property
@@ -194,8 +198,8 @@ class AbstractSensor(AbstractInstrument):
         return (self.channel,)
 
     def show(
-        self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
-    ) -> dict[str, Float[Array, " *k"]]:
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> dict[str, Float[Signal, " *k"]]:
         """The channel."""
         return {self.channel: self.measure(times, outputs, motion)}
 
@@ -248,6 +252,18 @@ def parameter_table(effect: AbstractEffect) -> dict[str, Parameter]:
         name = f"{effect.label}.{symbols[field.name]}"
         rows[field.name] = Parameter(name, units[field.name], lower=lower, prior_std=spread.get(field.name, math.inf))
     return rows
+
+
+def stacked(effects: Sequence[AbstractEffect]) -> list[tuple[list[int], Any]]:
+    """Effects that differ in their numbers alone as one whose numbers have a leading axis; and which those are.
+
+    What is compiled for such a stack serves all of it.
+    """
+    alike: dict[Any, list[int]] = {}
+    for index, effect in enumerate(effects):
+        alike.setdefault(jax.tree.structure(effect), []).append(index)
+    stack = lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves])
+    return [(own, jax.tree.map(stack, *(effects[i] for i in own))) for own in alike.values()]
 
 
 def admissible(effect: AbstractEffect, values: dict[str, float]) -> bool:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array
 
+from ..arrays import namespace
 from ..parameters import number
 from .base import AbstractForce, amplitude, shape
 from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
@@ -40,8 +40,9 @@ class _Suction(AbstractForce):
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The suction along the motion."""
-        distance = jnp.maximum(self.distance(motion), 0.0)
-        near = motion.rates["surge"] ** 2 * jnp.exp(-distance / jnp.maximum(self.h, 1e-6))
+        xp = namespace(motion.rates["surge"], self.h)
+        distance = xp.maximum(self.distance(motion), 0.0)
+        near = motion.rates["surge"] ** 2 * xp.exp(-distance / xp.maximum(self.h, 1e-6))
         return {"heave": self.heave * near, "pitch": self.pitch * near}
 
     @abc.abstractmethod
@@ -150,6 +151,7 @@ class TetherDrag(AbstractForce):
         """The drag along the motion."""
         u, v, w = (motion.rates[e] for e in EQUATIONS[:3])
         # a speed of exactly zero has no derivative
-        speed = jnp.sqrt(u**2 + v**2 + w**2 + 1e-12)
-        drag = -self.c * jnp.maximum(motion.positions["z"], 0.0) * speed
+        xp = namespace(u, self.c)
+        speed = xp.sqrt(u**2 + v**2 + w**2 + 1e-12)
+        drag = -self.c * xp.maximum(motion.positions["z"], 0.0) * speed
         return {e: drag * motion.rates[e] for e in self.equations}

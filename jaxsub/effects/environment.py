@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from ..arrays import namespace
 from ..parameters import number
 from .base import AbstractForce, amplitude, shape
 from .motion import EQUATIONS, FORCES, Facts, Motion, Signal, unit_per
@@ -49,11 +49,12 @@ class Current(AbstractForce):
     def force(self, motion: Motion) -> dict[str, Signal]:
         """What the damping of the water's own velocity takes away."""
         phi, theta, psi = (motion.positions[name] for name in ("phi", "theta", "psi"))
-        ahead = self.V_N * jnp.cos(psi) + self.V_E * jnp.sin(psi)
-        across = self.V_E * jnp.cos(psi) - self.V_N * jnp.sin(psi)
-        u = ahead * jnp.cos(theta)
-        v = ahead * jnp.sin(theta) * jnp.sin(phi) + across * jnp.cos(phi)
-        w = ahead * jnp.sin(theta) * jnp.cos(phi) - across * jnp.sin(phi)
+        xp = namespace(psi, self.V_N)
+        ahead = self.V_N * xp.cos(psi) + self.V_E * xp.sin(psi)
+        across = self.V_E * xp.cos(psi) - self.V_N * xp.sin(psi)
+        u = ahead * xp.cos(theta)
+        v = ahead * xp.sin(theta) * xp.sin(phi) + across * xp.cos(phi)
+        w = ahead * xp.sin(theta) * xp.cos(phi) - across * xp.sin(phi)
         rows = {e: motion.damping[EQUATIONS.index(e)] for e in self.equations}
         return {e: -(row[0] * u + row[1] * v + row[2] * w) for e, row in rows.items()}
 
@@ -115,4 +116,5 @@ class WaveForcing(AbstractForce):
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The wave along the run."""
         angle = self.omega * motion.time + 0.0 * motion.rates[self.equation]
-        return {self.equation: self.a * jnp.cos(angle) + self.b * jnp.sin(angle)}
+        xp = namespace(angle)
+        return {self.equation: self.a * xp.cos(angle) + self.b * xp.sin(angle)}

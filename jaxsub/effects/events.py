@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array
 
+from ..arrays import namespace
 from ..parameters import number
 from .base import AbstractForce, amplitude, shape
 from .hydrostatics import lift_moments
@@ -25,7 +25,8 @@ def _grid(facts: Facts) -> list[float]:
 
 def _since(motion: Motion, t_0: Signal | float, width: float) -> Signal | float:
     """From 0 to 1 about `t_0`, within about `width` s, so that there is a derivative in `t_0`."""
-    return 0.5 * (1.0 + jnp.tanh((motion.time - t_0) / width))
+    late = (motion.time - t_0) / width
+    return 0.5 * (1.0 + namespace(late).tanh(late))
 
 
 class MassShift(AbstractForce):

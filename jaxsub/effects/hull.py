@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
+from ..arrays import namespace
 from .base import AbstractForce, amplitude
 from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
 
@@ -56,7 +56,8 @@ class CrossflowDrag(AbstractForce):
         x, dx = 0.5 * self.length * nodes, 0.5 * self.length * weights
         local = motion.rates[across][..., None] + arm * x * motion.rates[turning][..., None]
         strips = -0.5 * WATER_DENSITY * self.diameter * self.C_d * abs(local) * local * dx
-        return {across: jnp.sum(strips, -1), turning: jnp.sum(arm * x * strips, -1)}
+        total = namespace(strips).sum
+        return {across: total(strips, -1), turning: total(arm * x * strips, -1)}
 
 
 class CoriolisCoupling(AbstractForce):
@@ -92,13 +93,14 @@ class CoriolisCoupling(AbstractForce):
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """Forces and moments of the momentum carried around."""
-        rates = jnp.stack(jnp.broadcast_arrays(*(motion.rates[e] for e in EQUATIONS)), -1)
-        deviation = rates - motion.cruise * jnp.eye(6)[0]
+        xp = namespace(*(motion.rates[e] for e in EQUATIONS), self.fraction)
+        rates = xp.stack(xp.broadcast_arrays(*(motion.rates[e] for e in EQUATIONS)), -1)
+        deviation = rates - motion.cruise * xp.eye(6)[0]
         momentum = deviation @ motion.inertia.T
         linear, angular, p, h = deviation[..., :3], deviation[..., 3:], momentum[..., :3], momentum[..., 3:]
-        force = jnp.cross(angular, p)
-        moment = jnp.cross(angular, h) + jnp.cross(linear, p)
-        total = -self.fraction * jnp.concatenate([force, moment], -1)
+        force = xp.cross(angular, p)
+        moment = xp.cross(angular, h) + xp.cross(linear, p)
+        total = -self.fraction * xp.concatenate([force, moment], -1)
         return {e: total[..., i] for i, e in enumerate(EQUATIONS) if e in self.equations}
 
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array
 
+from ..arrays import namespace
 from .base import AbstractForce, amplitude
 from .motion import GRAVITY, Facts, Motion, Signal
 
@@ -17,17 +17,19 @@ REFERENCE_TEMPERATURE = 288.15
 def lift(motion: Motion, newton: Signal) -> dict[str, Signal]:
     """Body-axis force of `newton` of extra buoyancy: up, turned by the attitude (equations.md §1 with B + ΔB)."""
     phi, theta = motion.positions["phi"], motion.positions["theta"]
+    xp = namespace(phi, theta)
     return {
-        "surge": newton * jnp.sin(theta),
-        "sway": -newton * jnp.sin(phi) * jnp.cos(theta),
-        "heave": -newton * jnp.cos(phi) * jnp.cos(theta),
+        "surge": newton * xp.sin(theta),
+        "sway": -newton * xp.sin(phi) * xp.cos(theta),
+        "heave": -newton * xp.cos(phi) * xp.cos(theta),
     }
 
 
 def lift_moments(motion: Motion, axis: str, arm: Signal | float) -> dict[str, Signal]:
     """Moment of a lift that acts off the origin along a body `axis`; `arm` is the lift times its distance, N m."""
     phi, theta = motion.positions["phi"], motion.positions["theta"]
-    level, rolled, pitched = jnp.cos(phi) * jnp.cos(theta), jnp.sin(phi) * jnp.cos(theta), jnp.sin(theta)
+    xp = namespace(phi, theta)
+    level, rolled, pitched = xp.cos(phi) * xp.cos(theta), xp.sin(phi) * xp.cos(theta), xp.sin(theta)
     moments: dict[str, dict[str, Signal]] = {
         "x": {"pitch": arm * level, "yaw": -arm * rolled},
         "y": {"roll": -arm * level, "yaw": -arm * pitched},

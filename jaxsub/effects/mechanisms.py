@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array
 
+from ..arrays import namespace
 from ..parameters import number
 from .base import AbstractForce, amplitude, shape
 from .motion import Facts, Motion, Signal
@@ -52,7 +52,8 @@ class CoulombFriction(AbstractCoordinateForce):
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The friction along the motion."""
-        return {self.equation: -self.F_c * jnp.tanh(motion.rates[self.equation] / self.smoothing) - self.F_0}
+        share = motion.rates[self.equation] / self.smoothing
+        return {self.equation: -self.F_c * namespace(share).tanh(share) - self.F_0}
 
 
 class AsymmetricDamping(AbstractCoordinateForce):
@@ -79,7 +80,7 @@ class AsymmetricDamping(AbstractCoordinateForce):
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The force along the motion."""
-        return {self.equation: -self.D_a * jnp.abs(motion.rates[self.equation])}
+        return {self.equation: -self.D_a * abs(motion.rates[self.equation])}
 
 
 class CubicStiffness(AbstractCoordinateForce):
@@ -134,4 +135,6 @@ class Saturation(AbstractCoordinateForce):
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The restoring force along the motion."""
-        return {self.equation: -self.F_s * jnp.tanh(motion.positions[self.equation] / jnp.maximum(self.x_s, 1e-9))}
+        place = motion.positions[self.equation]
+        xp = namespace(place, self.x_s)
+        return {self.equation: -self.F_s * xp.tanh(place / xp.maximum(self.x_s, 1e-9))}

@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array
 
 from ..parameters import number
-from .base import AbstractForce, amplitude, shape
+from .base import AbstractForce, amplitude, shape, stacked
 from .motion import FORCES, Facts, Motion, Signal, unit_per
 
 # what of a motion changes along a run
@@ -130,22 +130,35 @@ class Hysteresis(AbstractMemory):
         return {self.states[0]: (rate - 0.5 * (abs(rate) * z + rate * abs(z))) / jnp.maximum(self.x_y, 1e-9)}
 
 
-def with_memory(effect: AbstractMemory, start: Motion, end: Motion, steps: Signal) -> tuple[Motion, Motion]:
-    """A motion at both ends of every interval, the states of `effect` filled in, from zero.
+def with_memories(
+    effects: Sequence[AbstractMemory], start: Motion, end: Motion, steps: Signal
+) -> list[tuple[Motion, Motion]]:
+    """For each of `effects` a motion at both ends of every interval, the effect's states filled in, from zero.
 
     Every leaf that changes has the shape (R, K-1) of `steps`, the length of each interval in s, 0 where padded. Between
     the ends a motion is taken for a line; the states go over each interval by the classical Runge-Kutta step.
     """
-    before, after = _remembered(effect, start, end, jnp.asarray(steps))
-    fill = lambda motion, found: dataclasses.replace(
-        motion, positions=motion.positions | {name: np.asarray(value) for name, value in found.items()}
-    )
-    return fill(start, before), fill(end, after)
+    alike = stacked(effects)
+    made = _remembered([stack for _, stack in alike], start, end, steps) if alike else []
+    found: list[Any] = [None] * len(effects)
+    for (own, _), ends in zip(alike, made, strict=True):
+        for place, index in enumerate(own):
+            before, after = jax.tree.map(lambda leaf, place=place: np.asarray(leaf)[place], ends)
+            filled = lambda motion, states: dataclasses.replace(motion, positions=motion.positions | states)
+            found[index] = filled(start, before), filled(end, after)
+    return found
 
 
 @eqx.filter_jit
 def _remembered(
-    effect: AbstractMemory, start: Motion, end: Motion, steps: Array
+    stacks: list[AbstractMemory], start: Motion, end: Motion, steps: Signal
+) -> list[tuple[dict[str, Array], dict[str, Array]]]:
+    """The states of all effects of each stack, one program for all of them."""
+    return [jax.vmap(lambda effect: _states(effect, start, end, steps))(stack) for stack in stacks]
+
+
+def _states(
+    effect: AbstractMemory, start: Motion, end: Motion, steps: Signal
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """The states at both ends of every interval, (R, K-1) each."""
 

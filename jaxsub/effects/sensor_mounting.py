@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from ..arrays import namespace
 from ..errors import InputError
 from .base import AbstractInstrument, amplitude
 from .motion import EQUATIONS, VELOCITIES, Facts, Motion, Signal
@@ -77,12 +78,13 @@ class SensorMisalignment(_Mounting):
         return ", ".join(said(*pair) for pair in self._pairs())
 
     def show(
-        self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
-    ) -> dict[str, Float[Array, " *k"]]:
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> dict[str, Float[Signal, " *k"]]:
         """The outputs along the turned axes."""
         true = {velocity: motion.rates[equation] for velocity, equation in _EQUATIONS.items()} | dict(outputs)
-        own, across = jnp.cos(self.epsilon), jnp.sin(self.epsilon)
-        return {c: jnp.asarray(own * outputs[c] + sign * across * true[other]) for c, other, sign in self._pairs()}
+        xp = namespace(times, self.epsilon)
+        own, across = xp.cos(self.epsilon), xp.sin(self.epsilon)
+        return {c: xp.asarray(own * outputs[c] + sign * across * true[other]) for c, other, sign in self._pairs()}
 
     def _pairs(self) -> list[tuple[str, str, float]]:
         """Each channel, what it sees, and the sign."""
@@ -138,31 +140,34 @@ class SensorLeverArm(_Mounting):
         return f"(R l_{self.axis})"
 
     def show(
-        self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion
-    ) -> dict[str, Float[Array, " *k"]]:
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> dict[str, Float[Signal, " *k"]]:
         """The outputs where the sensor is."""
-        return {c: jnp.asarray(outputs[c] + self.arm * self._per_metre(c, motion)) for c in self.channels}
+        asarray = namespace(times, self.arm).asarray
+        return {c: asarray(outputs[c] + self.arm * self._per_metre(c, motion)) for c in self.channels}
 
     def _per_metre(self, channel: str, motion: Motion) -> Signal:
-        unit = jnp.eye(3)["xyz".index(self.axis)]
-        turning = jnp.stack(jnp.broadcast_arrays(*(motion.rates[e] for e in EQUATIONS[3:])), -1)
-        moved = jnp.cross(turning, jnp.broadcast_to(unit, turning.shape))
+        xp = namespace(*(motion.rates[e] for e in EQUATIONS[3:]))
+        unit = np.eye(3)["xyz".index(self.axis)]
+        turning = xp.stack(xp.broadcast_arrays(*(motion.rates[e] for e in EQUATIONS[3:])), -1)
+        moved = xp.cross(turning, xp.broadcast_to(unit, turning.shape))
         if channel in _TRIADS[0]:
             return moved[..., _TRIADS[0].index(channel)]
         if channel in _TRIADS[2]:
-            still = jnp.zeros_like(turning[..., 0])
-            spin = jnp.stack([motion.accelerations.get(e, still) for e in EQUATIONS[3:]], -1)
-            felt = jnp.cross(spin, jnp.broadcast_to(unit, spin.shape)) + jnp.cross(turning, moved)
+            still = xp.zeros_like(turning[..., 0])
+            spin = xp.stack([motion.accelerations.get(e, still) for e in EQUATIONS[3:]], -1)
+            felt = xp.cross(spin, xp.broadcast_to(unit, spin.shape)) + xp.cross(turning, moved)
             return felt[..., _TRIADS[2].index(channel)]
         return self._turned(channel, motion)
 
     def _turned(self, channel: str, motion: Motion) -> Signal:
         """Entry of R(φ, θ, ψ) by the position's row and the arm's column."""
         phi, theta, psi = (motion.positions[name] for name in ("phi", "theta", "psi"))
-        level = {"x": jnp.cos(theta), "y": jnp.sin(theta) * jnp.sin(phi), "z": jnp.sin(theta) * jnp.cos(phi)}[self.axis]
-        across = {"x": jnp.zeros_like(phi), "y": jnp.cos(phi), "z": -jnp.sin(phi)}[self.axis]
+        xp = namespace(phi, theta, psi)
+        level = {"x": xp.cos(theta), "y": xp.sin(theta) * xp.sin(phi), "z": xp.sin(theta) * xp.cos(phi)}[self.axis]
+        across = {"x": xp.zeros_like(phi), "y": xp.cos(phi), "z": -xp.sin(phi)}[self.axis]
         if channel == "x":
-            return level * jnp.cos(psi) - across * jnp.sin(psi)
+            return level * xp.cos(psi) - across * xp.sin(psi)
         if channel == "y":
-            return level * jnp.sin(psi) + across * jnp.cos(psi)
-        return {"x": -jnp.sin(theta), "y": jnp.cos(theta) * jnp.sin(phi), "z": jnp.cos(theta) * jnp.cos(phi)}[self.axis]
+            return level * xp.sin(psi) + across * xp.cos(psi)
+        return {"x": -xp.sin(theta), "y": xp.cos(theta) * xp.sin(phi), "z": xp.cos(theta) * xp.cos(phi)}[self.axis]

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..arrays import namespace
 from ..parameters import number
 from .base import AbstractSensor, amplitude, shape
 from .motion import Facts, Motion, Signal
@@ -39,10 +40,13 @@ class SensorDelay(AbstractSensor):
         """The delay."""
         return f"{self.channel} measured(t) = {self.channel}(t - τ)"
 
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+    def measure(
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> Float[Signal, " *k"]:
         """The output a while ago."""
-        late = jnp.vectorize(jnp.interp, signature="(k),(k),(k)->(k)")
-        return late(times - jnp.maximum(self.tau, 0.0), times, jnp.asarray(outputs[self.channel]))
+        xp = namespace(times, self.tau)
+        late = xp.vectorize(xp.interp, signature="(k),(k),(k)->(k)")
+        return late(times - xp.maximum(self.tau, 0.0), times, xp.asarray(outputs[self.channel]))
 
     def remembered(self, interval: float) -> int:
         """The samples of the delay."""
@@ -77,9 +81,12 @@ class SensorSaturation(AbstractSensor):
         """The limit."""
         return f"|{self.channel} measured| <= limit"
 
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+    def measure(
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> Float[Signal, " *k"]:
         """The output within the limit."""
-        return jnp.clip(jnp.asarray(outputs[self.channel]), -self.limit, self.limit)
+        xp = namespace(times, self.limit)
+        return xp.clip(xp.asarray(outputs[self.channel]), -self.limit, self.limit)
 
 
 class SensorRectification(AbstractSensor):
@@ -103,7 +110,9 @@ class SensorRectification(AbstractSensor):
         """The lost sign."""
         return f"{self.channel} measured = {self.channel} + f (|{self.channel}| - {self.channel})"
 
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+    def measure(
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> Float[Signal, " *k"]:
         """The rectified output."""
-        true = jnp.asarray(outputs[self.channel])
-        return true + self.f * (jnp.abs(true) - true)
+        true = namespace(times, self.f).asarray(outputs[self.channel])
+        return true + self.f * (abs(true) - true)

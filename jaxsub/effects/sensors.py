@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..arrays import namespace
 from .base import AbstractSensor, amplitude
 from .motion import CHANNEL_UNITS, Facts, Motion, Signal
 
@@ -33,9 +33,11 @@ class SensorBias(AbstractSensor):
         """The bias."""
         return f"{self.channel} measured = {self.channel} + b"
 
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+    def measure(
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> Float[Signal, " *k"]:
         """The biased output."""
-        return jnp.asarray(outputs[self.channel] + self.bias)
+        return namespace(times, self.bias).asarray(outputs[self.channel] + self.bias)
 
 
 class SensorScale(AbstractSensor):
@@ -57,9 +59,11 @@ class SensorScale(AbstractSensor):
         """The scale."""
         return f"{self.channel} measured = (1 + s) {self.channel}"
 
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+    def measure(
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> Float[Signal, " *k"]:
         """The scaled output."""
-        return jnp.asarray((1.0 + self.scale) * outputs[self.channel])
+        return namespace(times, self.scale).asarray((1.0 + self.scale) * outputs[self.channel])
 
 
 class SensorDrift(AbstractSensor):
@@ -84,6 +88,8 @@ class SensorDrift(AbstractSensor):
         """The drift."""
         return f"{self.channel} measured = {self.channel} + d t"
 
-    def measure(self, times: Float[Array, " *k"], outputs: Mapping[str, Signal], motion: Motion) -> Float[Array, " *k"]:
+    def measure(
+        self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
+    ) -> Float[Signal, " *k"]:
         """The drifting output."""
-        return jnp.asarray(outputs[self.channel] + self.drift * times)
+        return namespace(times, self.drift).asarray(outputs[self.channel] + self.drift * times)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array
 
+from ..arrays import namespace
 from ..errors import InputError
 from .base import AbstractForce, amplitude, edge
 from .motion import FORCES, Facts, Motion, Signal, by_name, unit_per
@@ -78,8 +78,9 @@ class SmoothForce(AbstractForce):
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The force along the motion."""
         x = variables(motion)[self.variable]
-        place = jnp.clip((x - self.low) / (self.high - self.low), 0.0, 1.0) * (KNOTS - 1)
-        parts = [getattr(self, f"a_{j}") * jnp.maximum(0.0, 1.0 - abs(place - j)) for j in range(KNOTS)]
+        xp = namespace(x, self.a_0)
+        place = xp.clip((x - self.low) / (self.high - self.low), 0.0, 1.0) * (KNOTS - 1)
+        parts = [getattr(self, f"a_{j}") * xp.maximum(0.0, 1.0 - abs(place - j)) for j in range(KNOTS)]
         return {self.equation: functools.reduce(operator.add, parts)}
 
 
@@ -90,5 +91,6 @@ def variables(motion: Motion) -> dict[str, Signal]:
     """
     found = by_name(motion)
     if "psi" in found:
-        found["psi"] = jnp.arctan2(jnp.sin(found["psi"]), jnp.cos(found["psi"]))
+        xp = namespace(found["psi"])
+        found["psi"] = xp.arctan2(xp.sin(found["psi"]), xp.cos(found["psi"]))
     return found

@@ -13,9 +13,11 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from ..arrays import Values, namespace
 from ..likelihood import Columns, Disturbance, System, covariance_derivatives, products, restricted
 from .damped import Damped
 from .problem import Expansion
@@ -30,8 +32,8 @@ _LOOSE = (5.0, 1.5, 2.0)
 _SLOWEST, _EDGE = 0.5, 0.1
 # of those logarithms: beyond, curvature says nothing
 _FARTHEST = 2.0
-# columns are filled up to a multiple of this many, so that models of several sizes share a program
-_SIDE_BY_SIDE = 8
+# columns are padded to a multiple of this many, so that models of several sizes share a program
+_SIDE_BY_SIDE = 16
 
 
 class _Given(NamedTuple):
@@ -42,7 +44,7 @@ class _Given(NamedTuple):
 
 
 def estimate_disturbance(
-    system: System, columns: Columns, prior: Float[Array, "p1 p1"], start: Disturbance
+    system: System, columns: Columns, prior: Float[Values, "p1 p1"], start: Disturbance
 ) -> Disturbance:
     """The disturbance of largest restricted likelihood, or a better one than `start` where that is far from it.
 
@@ -51,8 +53,9 @@ def estimate_disturbance(
     """
     known = len(prior)
     whole = -(-known // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
-    filled = jax.tree.map(lambda M: jnp.pad(M, [(0, 0)] * 3 + [(0, whole - known)]), columns)
-    return _search(system, filled, jnp.eye(whole).at[:known, :known].set(prior), start)
+    xp = namespace(prior)
+    filled = xp.pad(prior, (0, whole - known)) + xp.diag(np.repeat([0.0, 1.0], [known, whole - known]))
+    return _search(system, columns.padded(whole), filled, start)
 
 
 @eqx.filter_jit
@@ -89,7 +92,7 @@ def _expand(given: _Given, y: Array) -> Expansion:
     system, columns, prior = given.system, given.columns, given.prior
 
     def of(y: Array, residual: Array) -> Array:
-        shown = columns.shown.at[..., 0].set(residual)
+        shown = jnp.asarray(columns.shown).at[..., 0].set(residual)
         return _cost(y, given._replace(columns=Columns(shown, columns.forcing)))
 
     cost, (gradient, error) = jax.value_and_grad(of, argnums=(0, 1))(y, columns.shown[..., 0])

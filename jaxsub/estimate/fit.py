@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..arrays import Values, quietly
 from ..filter.vehicle import unfilterable
 from ..likelihood import Linearised, concentrated_sigma, linearise, residual_outputs
 from ..recording.runs import Runs
@@ -95,9 +96,10 @@ class Fit(Ended):
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
 
     @property
-    def residual(self) -> Float[Array, "r k c"]:
+    @quietly
+    def residual(self) -> Float[np.ndarray, "r k c"]:
         """Whitened residuals."""
-        return self.model.error / self.sigma
+        return np.asarray(self.model.error) / np.asarray(self.sigma)
 
     @property
     def rms(self) -> dict[str, float]:
@@ -105,10 +107,12 @@ class Fit(Ended):
         return channel_rms(self.residual, self.runs, self.vehicle.layout.channels)
 
 
-def channel_rms(residual: Array, runs: Runs, channels: tuple[str, ...]) -> dict[str, float]:
+@quietly
+def channel_rms(residual: Values, runs: Runs, channels: tuple[str, ...]) -> dict[str, float]:
     """rms of whitened residuals by channel, over what was measured."""
-    mean_square = jnp.sum(residual**2, (0, 1)) / jnp.maximum(runs.samples(), 1.0)
-    return dict(zip(channels, np.sqrt(np.asarray(mean_square)).tolist(), strict=True))
+    samples = np.sum(np.asarray(runs.mask), axis=(0, 1))
+    mean_square = np.sum(np.asarray(residual) ** 2, axis=(0, 1)) / np.maximum(samples, 1.0)
+    return dict(zip(channels, np.sqrt(mean_square).tolist(), strict=True))
 
 
 def search(

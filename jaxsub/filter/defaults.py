@@ -3,8 +3,10 @@
 from collections.abc import Callable
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from ..arrays import Values, namespace
 from ..effects import CHANNEL_UNITS
 from ..vehicle import AbstractVehicle
 from .ekf import AbstractFilter
@@ -21,7 +23,7 @@ _USUAL = {"m/s": 0.01, "rad/s": 0.0035, "rad": 0.005, "m": 0.05}
 _PARTNERS = dict(zip("uvwpqr", ("x", "y", "z", "phi", "theta", "psi"), strict=True))
 
 
-def state_scale(vehicle: AbstractVehicle, sigma: Float[Array, " c"]) -> Float[Array, " s"]:
+def state_scale(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values, " s"]:
     """For each state the noise of its channel, SI; else that of its rate or its integral over a second; else usual."""
     layout = vehicle.layout
     known = dict(zip(layout.channels, sigma, strict=True))
@@ -29,8 +31,8 @@ def state_scale(vehicle: AbstractVehicle, sigma: Float[Array, " c"]) -> Float[Ar
         known.setdefault("z", known["depth"])
     partner = _PARTNERS if layout.kind == "submerged-body" else {f"{e}_rate": e for e in layout.equations}
     partner = partner | {position: rate for rate, position in partner.items()}
-    usual = lambda name: jnp.asarray(_USUAL.get(CHANNEL_UNITS.get(name, ""), 1.0))
-    return jnp.stack([known.get(n, known.get(partner.get(n, ""), usual(n))) for n in layout.states])
+    usual = lambda name: np.asarray(_USUAL.get(CHANNEL_UNITS.get(name, ""), 1.0))
+    return namespace(sigma).stack([known.get(n, known.get(partner.get(n, ""), usual(n))) for n in layout.states])
 
 
 def vehicle_filter(

@@ -15,9 +15,11 @@ the disturbance, and the restricted likelihood allows for that.
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
+from ..arrays import Values, namespace
 from ..recording.runs import Runs
 from .innovation_products import Steps, beyond, innovation_products, passes, products_by_part
 from .sensitivity import Jacobians, Linearised, propagate
@@ -32,9 +34,9 @@ class Disturbance(eqx.Module):
     - `noise`: (c,) white noise of each channel, in units of the noise that the residuals were whitened with.
     """
 
-    force: Float[Array, " n"]
-    time: Float[Array, " n"]
-    noise: Float[Array, " c"]
+    force: Float[Values, " n"]
+    time: Float[Values, " n"]
+    noise: Float[Values, " c"]
 
 
 class System(eqx.Module):
@@ -44,7 +46,7 @@ class System(eqx.Module):
 
     - `A`: (R, K-1, s, s) of the step by the state. `G`: (R, K-1, s, 2n) by a force at its start and end.
     - `C`: (R, K, c, s) of the channels by the state, zero where nothing was measured; `measured`: (R, K, c).
-    - `intervals`: (R, K-1) s. `spread`: (s,) prior standard deviation of the initial states.
+    - `intervals`: (R, K-1) s, 0 where padded. `spread`: (s,) prior standard deviation of the initial states.
     """
 
     A: Float[Array, "r k1 s s"]
@@ -60,7 +62,8 @@ class System(eqx.Module):
     ) -> "System":
         """A linearised model on `runs`, its channels in units of `sigma`."""
         C = model.C * (runs.mask / sigma)[..., None]
-        return cls(model.A, model.G, C, runs.mask, runs.steps[runs.step_of], spread)
+        intervals = jnp.where(runs.live, runs.steps[runs.step_of], 0.0)
+        return cls(model.A, model.G, C, runs.mask, intervals, spread)
 
 
 class Columns(eqx.Module):
@@ -74,23 +77,29 @@ class Columns(eqx.Module):
     - `forcing`: (R, K-1, s, q) on the state in each step; None where `shown` holds that already.
     """
 
-    shown: Float[Array, "r k c q"]
-    forcing: Float[Array, "r k1 s q"] | None = None
+    shown: Float[Values, "r k c q"]
+    forcing: Float[Values, "r k1 s q"] | None = None
 
     def __add__(self, other: "Columns") -> "Columns":
-        """Both, side by side; either may lack forcing only if the other does."""
-        side_by_side = lambda a, b: jnp.concatenate([a, b], axis=-1)
-        return jax.tree.map(side_by_side, self, other)
+        """Both, side by side; either may lack forcing only if the other does. NumPy arrays stay NumPy arrays."""
+
+        return jax.tree.map(lambda a, b: namespace(a, b).concatenate([a, b], axis=-1), self, other)
+
+    def padded(self, width: int) -> "Columns":
+        """With empty columns behind them, `width` in all. NumPy arrays stay NumPy arrays."""
+        pad = lambda M: namespace(M).pad(M, [(0, 0)] * (M.ndim - 1) + [(0, width - M.shape[-1])])
+        return jax.tree.map(pad, self)
 
 
+@eqx.filter_jit
 def first_guess(system: System, residual: Float[Array, "r k c"]) -> Disturbance:
     """Where to start looking: in each equation a force whose lasting effect is as large as the `residual`."""
-    n, (r, k1) = system.G.shape[3] // 2, system.intervals.shape
+    n, r = system.G.shape[3] // 2, len(system.intervals)
     steady = system.G[..., :n] + system.G[..., n:]
     response = system.C @ propagate(system.A, steady, jnp.zeros((r, system.A.shape[-1], n)))
     effect = jnp.sqrt(jnp.sum(response**2, (0, 1, 2)))
     length = jnp.max(jnp.sum(system.intervals, axis=1))
-    slow = jnp.sqrt(length * length / k1)
+    slow = length / jnp.sqrt(jnp.max(jnp.sum(system.intervals > 0.0, axis=1)))
     force = jnp.sqrt(jnp.sum(residual**2)) / jnp.where(effect > 0.0, effect, 1.0)
     return Disturbance(force, jnp.full(n, slow), jnp.ones(residual.shape[2]))
 
@@ -103,25 +112,12 @@ def restricted(
     The first of the `columns` is the residual, the others are fitted to it; `prior` is the Gram matrix of the residual
     and columns of their priors.
     """
-    return restricted_of(*products(disturbance, system, columns, prior))
-
-
-def restricted_of(gram: Float[Array, "p1 p1"], spread: Float[Array, ""] | float) -> Float[Array, ""]:
-    """`restricted` by the `products` of the columns and half the log-determinant of the residuals' covariance."""
+    gram, spread = products(disturbance, system, columns, prior)
     among = jnp.linalg.cholesky(gram[1:, 1:])
     explained = solve_triangular(among, gram[1:, 0], lower=True)
     return spread + jnp.sum(jnp.log(jnp.diagonal(among))) + 0.5 * (gram[0, 0] - explained @ explained)
 
 
-def fitted(
-    disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "p1 p1"]
-) -> Float[Array, " p1"]:
-    """One for the residual and for each other column minus the weight with which it is fitted to it."""
-    gram, _ = products(disturbance, system, columns, prior)
-    return jnp.concatenate([jnp.ones(1), -jnp.linalg.solve(gram[1:, 1:], gram[1:, 0])])
-
-
-@eqx.filter_jit
 def products(
     disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "q q"]
 ) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
@@ -130,6 +126,7 @@ def products(
     return gram + prior, spread
 
 
+@eqx.filter_jit
 def whitened(
     disturbance: Disturbance, system: System, columns: Columns
 ) -> tuple[Float[Array, "r k c q"], Float[Array, "r k c c"]]:
@@ -137,16 +134,29 @@ def whitened(
     return passes(*steps(disturbance, system, columns), lambda passed: (passed.white, passed.factor))
 
 
-def whitened_squares(disturbance: Disturbance, system: System, columns: Columns) -> Float[Array, " q"]:
-    """The sum of squares of each column's whitened innovations."""
-    squares = passes(*steps(disturbance, system, columns), lambda passed: jnp.sum(passed.white**2, axis=0))
-    return jnp.sum(squares, axis=(0, 1))
-
-
 def part_products(
     disturbance: Disturbance, system: System, columns: Columns, parts: int
+) -> tuple[Float[np.ndarray, "r m q q"], Float[np.ndarray, "r m"]]:
+    """Products of all columns whitened, in each of `parts` of every run; half the log-determinant of each part.
+
+    Columns are padded to one of a few widths, so that one program serves many numbers of them. Not to be called in
+    `jit`.
+    """
+    count = columns.shown.shape[-1]
+    found, spreads = _part_products(disturbance, system, columns.padded(padded_width(count)), parts)
+    return np.asarray(found)[..., :count, :count], np.asarray(spreads)
+
+
+def padded_width(count: int) -> int:
+    """The least of 16, 24, 32, 48, 64, 96 … that is not less than `count`: at most half as many more."""
+    power = max(16, 1 << (max(count, 1) - 1).bit_length())
+    return 3 * power // 4 if count <= 3 * power // 4 and power > 16 else power
+
+
+@eqx.filter_jit
+def _part_products(
+    disturbance: Disturbance, system: System, columns: Columns, parts: int
 ) -> tuple[Float[Array, "r m q q"], Float[Array, "r m"]]:
-    """Products of all columns whitened, in each of `parts` of every run; half the log-determinant of each part."""
     return products_by_part(*steps(disturbance, system, columns), parts)
 
 
@@ -294,7 +304,7 @@ def smoothed(
         mean, spread = m - P @ lever, jnp.diag(P - P @ weight @ P)
         return (lever, weight), (mean[s:], jnp.sqrt(jnp.maximum(spread[s:], 0.0)))
 
-    def run(*samples: Array) -> tuple[Array, Array]:
+    def run(*samples: Values) -> tuple[Array, Array]:
         begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
         _, kept = jax.lax.scan(forth, (jnp.zeros(s + n), begin), samples)
         nothing = jnp.zeros(s + n), jnp.zeros((s + n, s + n))

@@ -21,6 +21,8 @@ import jax.numpy as jnp
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Float
 
+from ..arrays import Values
+
 T = TypeVar("T")
 
 # samples whose innovations are held until their products are taken
@@ -39,8 +41,8 @@ class Steps(NamedTuple):
     B: Float[Array, "r k z n"]
     C: Float[Array, "r k c s"]
     noise: Float[Array, "r k c"]
-    shown: Float[Array, "r k c q"]
-    forcing: Float[Array, "r k1 s q"] | None
+    shown: Float[Values, "r k c q"]
+    forcing: Float[Values, "r k1 s q"] | None
 
 
 class Passed(NamedTuple):
@@ -74,7 +76,7 @@ def _met(carry: tuple[Array, Array], at: Steps) -> tuple[tuple[Array, Array], Pa
     return (at.F @ (P - half.T @ half) @ at.F.T + at.B @ at.B.T, after), Passed(white, factor, half, P, X)
 
 
-def beyond(M: Array) -> Array:
+def beyond(M: Values) -> Array:
     """With a step more after the last sample, so that one loop serves all; it leads nowhere."""
     return jnp.concatenate([M, jnp.zeros_like(M[:, :1])], axis=1)
 

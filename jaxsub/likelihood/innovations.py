@@ -20,7 +20,7 @@ from ..effects import AbstractSensor
 from ..recording.runs import Runs
 from ..simulate import Sampled
 from ..vehicle import AbstractVehicle
-from .disturbance import Columns, Disturbance, System, augmented
+from .disturbance import Columns, Disturbance, System, augmented, whitened
 from .sensitivity import jacobians
 
 
@@ -34,6 +34,8 @@ class Followed(eqx.Module):
     - `system`: linearised, steps at the filtered and outputs at the expected states.
     - `residual`: one column, the measured outputs less those expected, and what led the path away from a free run.
     - `theta`: p columns, by the free parameters.
+    - `products`: (1 + p, 1 + p) of the residual and `theta`, whitened under the disturbance; `spread`: half the
+      log-determinant of the residual's covariance; `log_likelihood`: (R, K) of each sample given those before it.
     """
 
     expected: Float[Array, "r k s"]
@@ -42,6 +44,9 @@ class Followed(eqx.Module):
     system: System
     residual: Columns
     theta: Columns
+    products: Float[Array, "p1 p1"]
+    spread: Float[Array, ""]
+    log_likelihood: Float[Array, "r k"]
 
 
 @eqx.filter_jit
@@ -68,7 +73,12 @@ def follow(
     led += jnp.einsum("rksn,rkn->rks", by.G, push.reshape(*push.shape[:2], -1))
     residual = Columns(jnp.where(runs.mask, error / sigma, 0.0)[..., None], led[..., None])
     theta = Columns(jnp.where(runs.mask[..., None], by.direct / sigma[:, None], 0.0), by.F)
-    return Followed(expected, filtered, force, system, residual, theta)
+    # whoever has a path wants its likelihood: in one program both are compiled in the time of one
+    white, factor = whitened(disturbance, system, residual + theta)
+    logarithm = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)), axis=-1)
+    log_likelihood = -logarithm - 0.5 * jnp.sum(white[..., 0] ** 2, axis=-1)
+    products = jnp.einsum("rkca,rkcb->ab", white, white)
+    return Followed(expected, filtered, force, system, residual, theta, products, jnp.sum(logarithm), log_likelihood)
 
 
 def _path(

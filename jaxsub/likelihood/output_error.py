@@ -4,6 +4,7 @@ $-\ln p(Z\mid\theta, x_0) = \tfrac12\sum_{r,k,c} m_{rkc}\,(z_{rkc} - \hat y_{rkc
 + \sum_c N_c\ln\sigma_c$, with m the mask, one free initial state a run, and $\sigma$ given or concentrated out.
 """
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -20,6 +21,7 @@ def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> 
     return residual_outputs(vehicle, runs, simulate(vehicle, runs, start))
 
 
+@eqx.filter_jit
 def residual_outputs(vehicle: AbstractVehicle, runs: Runs, modelled: Float[Array, "r k c"]) -> Float[Array, "r k c"]:
     """Measured minus `modelled`, zero where nothing was measured.
 

@@ -9,6 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..arrays import Values
 from ..effects import (
     CHANNEL_UNITS,
     VELOCITIES,
@@ -117,11 +118,11 @@ class AbstractVehicle(eqx.Module):
     effects: eqx.AbstractVar[tuple[AbstractEffect, ...]]
 
     @abc.abstractmethod
-    def mass_matrix(self) -> Float[Array, "n n"]:
+    def mass_matrix(self) -> Float[Values, "n n"]:
         """Inertia of the free equations."""
 
     @abc.abstractmethod
-    def damping_matrix(self) -> Float[Array, "n n"]:
+    def damping_matrix(self) -> Float[Values, "n n"]:
         r"""$\tilde A$ of the free equations."""
 
     @abc.abstractmethod
@@ -129,7 +130,7 @@ class AbstractVehicle(eqx.Module):
         """The vehicle's numbers by name, without its effects'."""
 
     @abc.abstractmethod
-    def with_own_values(self, values: dict[str, Array]) -> Self:
+    def with_own_values(self, values: Mapping[str, Values]) -> Self:
         """The same vehicle with other numbers for those named."""
 
     @abc.abstractmethod
@@ -155,7 +156,7 @@ class AbstractVehicle(eqx.Module):
             named |= {row.name: getattr(effect, field) for field, row in parameter_table(effect).items()}
         return named
 
-    def with_values(self, values: dict[str, Array]) -> Self:
+    def with_values(self, values: Mapping[str, Values]) -> Self:
         """The same vehicle with other numbers for those named."""
         vehicle = self.with_own_values(values)
         effects = []

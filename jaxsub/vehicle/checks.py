@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -22,7 +23,7 @@ ENVIRONMENT = ("density", "ballast", "temperature", "altitude")
 def require_inertia(vehicle: SubmergedBody | Mechanism, where: str) -> None:
     """Raise `InputError` naming the coefficients where the inertia matrix is not positive definite."""
     names = [n for n in vehicle.own_values() if n.endswith("dot") or n.startswith(("I_", "mass"))]
-    guilty = indefinite(np.asarray(vehicle.mass_matrix()), vehicle.layout.equations, names)
+    guilty = indefinite(jax.tree.map(np.asarray, vehicle).mass_matrix(), vehicle.layout.equations, names)
     if guilty:
         what = f"the inertia matrix is not positive definite because of {', '.join(guilty)}"
         raise InputError(f"{where}: coefficients", what, "check their signs: added masses such as Y_vdot are negative")

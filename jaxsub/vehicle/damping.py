@@ -3,6 +3,7 @@
 import equinox as eqx
 from jaxtyping import Array, Float
 
+from ..arrays import Values
 from .inertia import place, sparse
 
 
@@ -18,7 +19,7 @@ class Damping(eqx.Module):
 
     coefficients: dict[str, Float[Array, ""]]
 
-    def matrix(self, mass: Array, cruise: Array) -> Float[Array, "6 6"]:
+    def matrix(self, mass: Values, cruise: Values) -> Float[Values, "6 6"]:
         """The 6 × 6 matrix for a body of `mass` kg at the operating speed `cruise` m/s."""
         around = mass * cruise
         own = [(*place(name), value) for name, value in self.coefficients.items()]

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..arrays import Values, namespace
 from ..effects import EQUATIONS, VELOCITIES
 
 RIGID = ("mass", "mass", "mass", "I_x", "I_y", "I_z")
@@ -27,9 +28,10 @@ class Inertia(eqx.Module):
     rigid: dict[str, Float[Array, ""]]
     added: dict[str, Float[Array, ""]]
 
-    def matrix(self) -> Float[Array, "6 6"]:
+    def matrix(self) -> Float[Values, "6 6"]:
         """The 6 × 6 inertia matrix."""
-        rigid = jnp.diag(jnp.stack([self.rigid[name] for name in RIGID]))
+        xp = namespace(*self.rigid.values())
+        rigid = xp.diag(xp.stack([self.rigid[name] for name in RIGID]))
         entries = []
         for name, value in self.added.items():
             row, column = place(name)
@@ -44,18 +46,19 @@ def place(name: str) -> tuple[int, int]:
     return "XYZKMN".index(name[0]), "uvwpqr".index(name[2])
 
 
-def sparse(entries: Sequence[tuple[int, int, Array]]) -> Float[Array, "6 6"]:
+def sparse(entries: Sequence[tuple[int, int, Values | np.generic]]) -> Float[Values, "6 6"]:
     """The 6 × 6 matrix with each value of `entries` added at its row and column.
 
     One contraction with a constant: a scatter for each is dozens of operations to compile in every use of the model.
     """
+    xp = namespace(*(value for _, _, value in entries))
     if not entries:
-        return jnp.zeros((6, 6), jnp.result_type(float))
+        return xp.zeros((6, 6), jnp.result_type(float))
     basis = np.zeros((len(entries), 6, 6))
     for ones, (row, column, _) in zip(basis, entries, strict=True):
         ones[row, column] = 1.0
-    values = jnp.stack([value for _, _, value in entries])
-    return jnp.tensordot(values, jnp.asarray(basis, values.dtype), 1)
+    values = xp.stack([value for _, _, value in entries])
+    return xp.tensordot(values, basis.astype(values.dtype), 1)
 
 
 def twin(name: str) -> str:

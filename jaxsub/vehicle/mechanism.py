@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from typing import Self
 
 import equinox as eqx
-import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from ..arrays import Values, namespace
 from ..effects import AbstractEffect, Motion, Signal
 from ..parameters import number
 from .base import AbstractVehicle, Layout, timed
@@ -29,11 +30,11 @@ class Mechanism(AbstractVehicle):
     layout: Layout = eqx.field(static=True)
     effects: tuple[AbstractEffect, ...] = ()
 
-    def mass_matrix(self) -> Float[Array, "n n"]:
+    def mass_matrix(self) -> Float[Values, "n n"]:
         """I."""
         return self._matrix("I", diagonal=1.0)
 
-    def damping_matrix(self) -> Float[Array, "n n"]:
+    def damping_matrix(self) -> Float[Values, "n n"]:
         """-D."""
         return -self._matrix("D")
 
@@ -41,7 +42,7 @@ class Mechanism(AbstractVehicle):
         """The coefficients."""
         return self.coefficients
 
-    def with_own_values(self, values: dict[str, Array]) -> Self:
+    def with_own_values(self, values: Mapping[str, Values]) -> Self:
         """The same mechanism with other coefficients for those named."""
         updated = {name: number(values.get(name, old)) for name, old in self.coefficients.items()}
         return dataclasses.replace(self, coefficients=updated)
@@ -77,11 +78,12 @@ class Mechanism(AbstractVehicle):
         coordinates = {name: motion.positions[name] for name in self.layout.equations}
         return coordinates | {f"{name}_rate": rate for name, rate in motion.rates.items()}
 
-    def _value(self, name: str) -> Array:
-        return self.coefficients.get(name, jnp.zeros(()))
+    def _value(self, name: str) -> Values:
+        return self.coefficients.get(name, np.zeros(()))
 
-    def _matrix(self, letter: str, diagonal: float = 0.0) -> Float[Array, "n n"]:
+    def _matrix(self, letter: str, diagonal: float = 0.0) -> Float[Values, "n n"]:
         equations = self.layout.equations
         entry = lambda i, j: self.coefficients.get(f"{letter}_{i}_{j}", self._value(f"{letter}_{j}_{i}"))
-        own = lambda i: self.coefficients.get(f"{letter}_{i}", number(diagonal))
-        return jnp.stack([jnp.stack([own(i) if i == j else entry(i, j) for j in equations]) for i in equations])
+        own = lambda i: self.coefficients.get(f"{letter}_{i}", np.asarray(diagonal))
+        stack = namespace(*self.coefficients.values()).stack
+        return stack([stack([own(i) if i == j else entry(i, j) for j in equations]) for i in equations])

@@ -6,8 +6,10 @@ from typing import Self
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from ..arrays import Values
 from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal
 from ..parameters import number
 from .base import AbstractVehicle, Layout, timed
@@ -40,11 +42,11 @@ class SubmergedBody(AbstractVehicle):
     layout: Layout = eqx.field(static=True)
     effects: tuple[AbstractEffect, ...] = ()
 
-    def mass_matrix(self) -> Float[Array, "n n"]:
+    def mass_matrix(self) -> Float[Values, "n n"]:
         """Inertia of the free equations."""
         return self._free(self.inertia.matrix())
 
-    def damping_matrix(self) -> Float[Array, "n n"]:
+    def damping_matrix(self) -> Float[Values, "n n"]:
         r"""$\tilde A$ of the free equations."""
         return self._free(self._damping())
 
@@ -55,7 +57,7 @@ class SubmergedBody(AbstractVehicle):
             "speed": self.cruise
         }
 
-    def with_own_values(self, values: dict[str, Array]) -> Self:
+    def with_own_values(self, values: Mapping[str, Values]) -> Self:
         """The same body with other numbers for those named."""
 
         def update(named: dict[str, Array]) -> dict[str, Array]:
@@ -121,9 +123,9 @@ class SubmergedBody(AbstractVehicle):
                 found[output.channel] = specific_force(motion, full, output.lever_arm)[output.channel]
         return found
 
-    def _damping(self) -> Float[Array, "6 6"]:
+    def _damping(self) -> Float[Values, "6 6"]:
         return self.damping.matrix(self.inertia.rigid["mass"], self.cruise)
 
-    def _free(self, matrix: Float[Array, "6 6"]) -> Float[Array, "n n"]:
-        rows = jnp.array([EQUATIONS.index(e) for e in self.layout.equations])
-        return matrix[rows][:, rows]
+    def _free(self, matrix: Float[Values, "6 6"]) -> Float[Values, "n n"]:
+        rows = [EQUATIONS.index(e) for e in self.layout.equations]
+        return matrix[np.ix_(rows, rows)]

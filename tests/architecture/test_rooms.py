@@ -13,9 +13,9 @@ HOUSE = Path(jaxsub.__file__).parent
 FILES = sorted(HOUSE.rglob("*.py"))
 # design.md, with effects before vehicle, which has them built in
 ORDER = (
-    "errors", "findings", "plain", "storage", "unit_names", "units", "parameters", "results", "symbolic", "recording",
-    "effects", "sensors", "vehicle", "simulate", "filter", "navigation", "likelihood", "estimate", "identifiability",
-    "checks", "discrepancy", "control", "sweep", "report", "cli", "__main__",
+    "errors", "findings", "plain", "storage", "unit_names", "units", "arrays", "parameters", "results", "symbolic",
+    "recording", "effects", "sensors", "vehicle", "simulate", "filter", "navigation", "likelihood", "estimate",
+    "identifiability", "checks", "discrepancy", "control", "sweep", "report", "cli", "__main__",
 )  # fmt: skip
 
 

@@ -37,7 +37,7 @@ def test_a_turn_leads_to_nothing_less_probable(fitted, monkeypatch):
     assert evidence_of(look(fitted, found.disturbance)) > still - 0.5
     # a hundred times too large at first, and a step of ten thousand down: all of it is too far, half is right
     large = dataclasses.replace(found.disturbance, force=100.0 * found.disturbance.force)
-    monkeypatch.setattr(view, "first_guess", lambda system, residual: large)
+    monkeypatch.setattr(view, "_guessed", lambda *given: large)
     monkeypatch.setattr(leading, "estimate_disturbance", led_to(1e-4))
     half = look(fitted)
     assert float(half.disturbance.force[0] / found.disturbance.force[0]) == pytest.approx(1.0, rel=1e-6)

@@ -9,7 +9,7 @@ from rigs import driven, oscillator, stacked
 from samples import BODY, RIG, motion
 from scipy.integrate import solve_ivp
 
-from jaxsub.effects import FluidMemory, Hysteresis, admissible, with_memory
+from jaxsub.effects import FluidMemory, Hysteresis, admissible, with_memories
 from jaxsub.simulate import Sampled, at_rest
 
 RATE = lambda t: 0.4 * np.sin(1.3 * t) + 0.2 * np.cos(3.1 * t)
@@ -48,7 +48,7 @@ def test_memory_along_a_stored_motion_is_the_solution_of_its_equation(known, eff
     start, end = ends(known, equation, offset)
     steps = np.diff(TIMES)[None] * np.array([[1.0], [1.0]])
     steps[1, 200:] = 0.0
-    before, after = with_memory(effect, start, end, steps)
+    [(before, after)] = with_memories([effect], start, end, steps)
     path = solve_ivp(lambda t, z: law(RATE(t), z), (0.0, TIMES[-1]), [0.0], t_eval=TIMES, rtol=1e-9, atol=1e-11).y[0]
     (state,) = effect.states
     scale = np.abs(path).max()
@@ -63,7 +63,7 @@ def test_memory_along_a_stored_motion_is_the_solution_of_its_equation(known, eff
 @pytest.mark.parametrize(("known", "effect", "equation", "law", "offset"), CASES, ids=["bouc-wen", "sway", "surge"])
 def test_memory_of_the_admissible_sign_takes_power_out_of_a_motion_from_rest(known, effect, equation, law, offset):
     start, end = ends(known, equation, offset)
-    before, _ = with_memory(effect, start, end, np.stack([np.diff(TIMES)] * 2))
+    [(before, _)] = with_memories([effect], start, end, np.stack([np.diff(TIMES)] * 2))
     force = np.asarray(effect.force(before)[equation])[0]
     work = np.cumsum(force * RATE(TIMES[:-1]) * np.diff(TIMES))
     sizes = {"F_h": 2.0, "x_y": 1.0} if equation == "x" else {"c": -2.0, "T_m": 1.0}

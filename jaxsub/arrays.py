@@ -1,0 +1,22 @@
+"""Which library does the arithmetic of arrays."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+# for NumPy on what may have diverged, which then is no number, as it is by JAX
+quietly = np.errstate(over="ignore", invalid="ignore", divide="ignore", under="ignore")
+# arrays of either library
+Values = Array | np.ndarray
+
+
+def namespace(*values: Any) -> Any:
+    """`jax.numpy` if any of `values` is an array of JAX's, else `numpy`.
+
+    What is evaluated once on NumPy arrays, such as a candidate effect along a recorded motion, is a handful of
+    operations: by JAX each of them would be a program, compiled or read from its cache for longer than it runs.
+    """
+    return jnp if any(isinstance(value, jax.Array) for value in values) else np
