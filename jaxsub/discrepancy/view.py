@@ -140,7 +140,7 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     problem, rms = of_order(fit.problem), fit.rms
     much = max(rms.values()) > _MUCH
     led = Led(problem, problem.guess if much else fit.start)
-    guess = dataclasses.replace(_guessed(fit.model, fit.runs, fit.sigma, problem.spread), noise=_white(fit))
+    guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.spread), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
     if much:
         vehicles += [file] if file is not None else []

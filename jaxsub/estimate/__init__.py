@@ -5,9 +5,9 @@ from .combined import Chain, Global
 from .disturbance import estimate_disturbance
 from .ends import Ends, ends
 from .filtered import Filtered
-from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, output_errors, predict, search
+from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, predict, search
 from .initial_states import initial_guess, rest, state_channels
-from .method import AbstractMethod, Found, Iterative, share_for, shares_at_once
+from .method import AbstractMethod, Found, Iterative, Passes, share_for, shares_at_once
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .posterior import posterior
 from .problem import Expansion, Problem, require_free
@@ -30,6 +30,7 @@ __all__ = [
     "Found",
     "Global",
     "Iterative",
+    "Passes",
     "Problem",
     "Rate",
     "assess",
@@ -49,7 +50,6 @@ __all__ = [
     "nelder_mead",
     "newton",
     "newton_eq10",
-    "output_errors",
     "posterior",
     "predict",
     "require_free",

@@ -15,9 +15,10 @@ from jaxtyping import Bool, Float
 from scipy import special
 
 from ..findings import Finding
+from ..likelihood import output_errors
 from ..likelihood.whiteness import portmanteau_by_channel, predicted_share
 from ..plain import plain
-from .fit import Ended, Fit, output_errors
+from .fit import Ended, Fit
 
 # probability of a false alarm of each test
 LEVEL = 0.01

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .method import AbstractMethod, Found, costs, lanes_for, problems
+from .method import AbstractMethod, Found, Passes, costs, lanes_for, problems
 from .problem import Problem
 
 # larger than any cost and still a number to an algorithm that compares
@@ -21,12 +21,16 @@ class Chain(AbstractMethod):
     second: AbstractMethod
 
     def run(
-        self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
+        self,
+        problem: Problem,
+        starts: Float[Array, "n d"],
+        outputs: Float[Array, "n r k c"] | None = None,
+        passes: Passes | None = None,
     ) -> Found:
         """Both, their evaluations added."""
-        before = self.first.run(problem, starts, outputs)
+        before = self.first.run(problem, starts, outputs, passes)
         usable = jnp.isfinite(before.cost)[:, None] & jnp.all(jnp.isfinite(before.y), axis=1, keepdims=True)
-        after = self.second.run(problem, jnp.where(usable, before.y, starts), outputs)
+        after = self.second.run(problem, jnp.where(usable, before.y, starts), outputs, passes)
         return eqx.tree_at(lambda found: found.evaluations, after, before.evaluations + after.evaluations)
 
 
@@ -50,7 +54,11 @@ class Global(AbstractMethod):
     generations: int = 300
 
     def run(
-        self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
+        self,
+        problem: Problem,
+        starts: Float[Array, "n d"],
+        outputs: Float[Array, "n r k c"] | None = None,
+        passes: Passes | None = None,
     ) -> Found:
         """One evolution for each start that is a number."""
         of, ends, counts = problems(problem, outputs), [], []
@@ -59,7 +67,7 @@ class Global(AbstractMethod):
             best, count = self._evolve(of(jnp.asarray(index)), start) if finite else (start, 0)
             ends.append(best)
             counts.append(count)
-        found = self.local.run(problem, jnp.asarray(np.stack(ends)), outputs)
+        found = self.local.run(problem, jnp.asarray(np.stack(ends)), outputs, passes)
         return eqx.tree_at(lambda found: found.evaluations, found, found.evaluations + jnp.asarray(counts))
 
     def _evolve(self, problem: Problem, start: np.ndarray) -> tuple[np.ndarray, int]:

@@ -24,7 +24,7 @@ _FIRST, _LEAST, _MOST = 1e-3, 1e-10, 1e12
 Along = Callable[[Array, Array], tuple[Array, Array]]
 
 
-class _State(eqx.Module):
+class State(eqx.Module):
     """Where the search is, what it knows there, and what it tries next."""
 
     fresh: Bool[Array, ""]
@@ -58,16 +58,22 @@ class Damped(optx.AbstractMinimiser):
     atol: ClassVar[float] = 0.0
     norm: ClassVar[Callable] = staticmethod(optx.two_norm)
 
-    def init(self, fn: Any, y: Array, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> _State:
+    def init(self, fn: Any, y: Array, args: Any, options: Any, f_struct: Any, aux_struct: Any, tags: Any) -> State:
         """Nothing is known yet; the start itself is tried first."""
-        zero = jnp.zeros((), y.dtype)
-        shapes = eqx.filter_eval_shape(self.expand, args, y)
-        at = jax.tree.map(lambda part: jnp.zeros(part.shape, part.dtype), shapes)
-        return _State(jnp.asarray(True), at, y, zero + 1.0, zero + _FIRST, zero + 2.0, zero + jnp.inf)
+        return self.begin(y, eqx.filter_eval_shape(self.expand, args, y))
 
-    def step(self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any) -> tuple[Array, _State, None]:
+    def begin(self, y: Array, like: Expansion) -> State:
+        """As `init`, where expansions have the shapes of `like`."""
+        zero = jnp.zeros((), y.dtype)
+        at = jax.tree.map(lambda part: jnp.zeros(part.shape, part.dtype), like)
+        return State(jnp.asarray(True), at, y, zero + 1.0, zero + _FIRST, zero + 2.0, zero + jnp.inf)
+
+    def step(self, fn: Any, y: Array, args: Any, options: Any, state: State, tags: Any) -> tuple[Array, State, None]:
         """Evaluate the trial, move there if it is better, and choose the next."""
-        new = self.expand(args, state.trial)
+        return *self.follow(y, args, state, self.expand(args, state.trial)), None
+
+    def follow(self, y: Array, args: Any, state: State, new: Expansion) -> tuple[Array, State]:
+        """The step, where the trial's expansion is `new`."""
         gain = (state.at.cost - new.cost) / state.promised
         finite = jnp.all(jnp.stack([jnp.all(jnp.isfinite(part)) for part in jax.tree.leaves(new)]))
         # what is stopped by bounds may promise nothing at all, and then is shortened
@@ -82,10 +88,10 @@ class Damped(optx.AbstractMinimiser):
         # a start that does not run gives nothing to go by, and ends the search
         decrement = jnp.where(state.fresh & ~finite, jnp.nan, decrement)
         growth = chosen(2.0, 2.0 * state.growth)
-        return y, _State(jnp.asarray(False), at, trial, promised, damping, growth, decrement), None
+        return y, State(jnp.asarray(False), at, trial, promised, damping, growth, decrement)
 
     def terminate(
-        self, fn: Any, y: Array, args: Any, options: Any, state: _State, tags: Any
+        self, fn: Any, y: Array, args: Any, options: Any, state: State, tags: Any
     ) -> tuple[Bool[Array, ""], optx.RESULTS]:
         """At the optimum; or stuck, where no step however short is better."""
         hopeless, stuck = jnp.isnan(state.decrement), state.damping > _MOST
@@ -94,7 +100,7 @@ class Damped(optx.AbstractMinimiser):
         return done, optx.RESULTS.where(hopeless, optx.RESULTS.nonfinite, result)
 
     def postprocess(
-        self, fn: Any, y: Array, aux: Any, args: Any, options: Any, state: _State, tags: Any, result: optx.RESULTS
+        self, fn: Any, y: Array, aux: Any, args: Any, options: Any, state: State, tags: Any, result: optx.RESULTS
     ) -> tuple[Array, Any, dict[str, Any]]:
         """The point itself."""
         return y, aux, {}

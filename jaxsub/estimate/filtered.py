@@ -12,7 +12,7 @@ from ..filter.passes import identify
 from ..filter.vehicle import VehicleProcess, samples
 from ..results import NONFINITE, RESULTS, SUCCESSFUL
 from .damped import Damped
-from .method import AbstractMethod, Found, costs, holding, in_shares, lanes_for, objective, problems
+from .method import AbstractMethod, Found, Passes, costs, holding, in_shares, lanes_for, objective, problems
 from .pool import pool
 from .problem import Problem
 
@@ -37,7 +37,11 @@ class Filtered(AbstractMethod):
     passes: int = eqx.field(static=True, default=2)
 
     def run(
-        self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
+        self,
+        problem: Problem,
+        starts: Float[Array, "n d"],
+        outputs: Float[Array, "n r k c"] | None = None,
+        passes: Passes | None = None,
     ) -> Found:
         """Filter from each of the `starts`. A filter that diverges ends as `nonfinite`. Not to be called in `jit`.
 

@@ -10,13 +10,13 @@ from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values, quietly
 from ..filter.vehicle import unfilterable
-from ..likelihood import Linearised, concentrated_sigma, linearise, residual_outputs
+from ..likelihood import BlockLinearised, Watch, concentrated_sigma, nobody, output_errors
 from ..recording.runs import Runs
 from ..results import RESULTS
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 from .curvature import alone
-from .method import AbstractMethod
+from .method import AbstractMethod, Passes
 from .methods import filtered_first, gauss_newton
 from .problem import Problem
 
@@ -68,14 +68,14 @@ class Fit(Ended):
     **Fields** beside those of `Ended`
 
     - `covariance`: of the p free parameters, physical units; the initial states' uncertainty is included.
-    - `model`: the vehicle linearised along the fitted trajectory.
+    - `model`: the vehicle linearised along the fitted trajectory, block by block.
     - `gradient_norm`: largest |∂cost/∂y| in scaled coordinates, relative to the largest curvature's square root: how
       many standard errors the optimum within bounds may still be away.
     - `pressed`: (p,) -1 for a parameter that presses on its lower bound, 1 on its upper one, 0 for any other.
     """
 
     covariance: Float[Array, "p p"]
-    model: Linearised
+    model: BlockLinearised
     gradient_norm: Float[Array, ""]
     pressed: Float[Array, " p"]
 
@@ -124,13 +124,14 @@ def search(
     start: Array | None = None,
     moving: bool = True,
     known_start: bool = False,
+    passes: Passes | None = None,
 ) -> Ended:
     """The maximum-likelihood vehicle, initial states and noise.
 
     `method` is Gauss–Newton where none is given. `known_start` takes the initial states `start` for the truth. `moving`
     false keeps the vehicle and finds the initial states alone, as a run that the fit did not see asks for.
     Noise comes from `sigma`, else from the vehicle file; channels whose noise is to be estimated have it concentrated
-    out: fit, take the rms, fit again from there, until it settles.
+    out: fit, take the rms, fit again from there, until it settles. `passes` is told as by `AbstractMethod.run`.
     """
     given = [output.sigma for output in vehicle.layout.outputs]
     estimated = np.array([s is None and sigma is None for s in given], bool)
@@ -141,7 +142,7 @@ def search(
     problem = Problem.of(vehicle, runs, noise, start, moving=moving, known_start=known_start)
     y, total = problem.coordinates(), 0
     for _ in range(_CONCENTRATIONS):
-        found = (method or gauss_newton()).run(problem, jax.device_put(np.asarray(y)[None])).one(0)
+        found = (method or gauss_newton()).run(problem, jax.device_put(np.asarray(y)[None]), passes=passes).one(0)
         y, cost, result = found.y, found.cost, found.result
         total += int(found.evaluations)
         fitted, states = problem.split(y)
@@ -162,11 +163,6 @@ def predict(vehicle: AbstractVehicle, runs: Runs, start: Array) -> Float[Array, 
     return simulate(vehicle, runs, start)
 
 
-def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Array) -> Float[Array, "r k c"]:
-    """Measured minus predicted outputs in SI, zero where nothing was measured."""
-    return residual_outputs(vehicle, runs, predict(vehicle, runs, start))
-
-
 @eqx.filter_jit
 def _signal(runs: Runs) -> Array:
     """The standard deviation of each measured channel: where the search for its noise starts."""
@@ -184,6 +180,7 @@ def fit(
     sigma: Array | None = None,
     start: Array | None = None,
     known_start: bool = False,
+    passes: Passes | None = None,
 ) -> Fit:
     """Fit the free numbers of `vehicle`, and an initial state for each run, to `runs`.
 
@@ -191,9 +188,9 @@ def fit(
     the more probable is taken. A free run of an unstable model is soon lost, while a filter is held to what was
     measured; the numbers that it comes to allow for what is missing. `sigma` overrides the file's noise; `start` is
     where the initial states' search begins, or with `known_start` what they are. A failure is a value in `Fit.result`,
-    no exception.
+    no exception. `passes` is told how many passes over long runs are done and expected (`AbstractMethod.run`).
     """
-    by = lambda method: _fitted(vehicle, runs, method, sigma, start, known_start)
+    by = lambda method: _fitted(vehicle, runs, method, sigma, start, known_start, passes)
     found = by(method)
     if method is None and not bool(found.result == RESULTS.successful) and not unfilterable(vehicle):
         found = min(found, by(filtered_first()), key=_improbable)
@@ -207,8 +204,14 @@ def _fitted(
     sigma: Array | None,
     start: Array | None,
     known_start: bool,
+    passes: Passes | None,
 ) -> Fit:
-    return evaluate(search(vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start))
+    tell = passes or (lambda done, expected: None)
+    # one pass more, for the statistics
+    told = lambda done, expected: tell(done, expected + 1.0)
+    ended = search(vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start, passes=told)
+    taken = int(ended.steps)
+    return evaluate(ended, lambda share: tell(taken + share, taken + 1.0))
 
 
 def _improbable(found: Fit) -> float:
@@ -217,21 +220,24 @@ def _improbable(found: Fit) -> float:
     return value if np.isfinite(value) else np.inf
 
 
-def evaluate(ended: Ended) -> Fit:
-    """The `Fit` where a search ended; itself where it is one."""
+def evaluate(ended: Ended, watch: Watch = nobody) -> Fit:
+    """The `Fit` where a search ended; itself where it is one. `watch` is told the share of the samples that is done."""
     if isinstance(ended, Fit):
         return ended
-    model = linearise(ended.vehicle, ended.runs, ended.start)
-    covariance, gradient, pressed, result = _statistics(ended.problem, model, ended.result)
+    problem = ended.problem
+    model = BlockLinearised.of(ended.vehicle, ended.runs, ended.start, ended.sigma, problem.spread, watch)
+    covariance, gradient, pressed, result = _statistics(problem, model.products, ended.result)
     told = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
     told["result"] = result
     return Fit(**told, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
 
 
 @eqx.filter_jit
-def _statistics(problem: Problem, model: Linearised, result: RESULTS) -> tuple[Array, Array, Array, RESULTS]:
+def _statistics(
+    problem: Problem, products: Float[Array, "r q q"], result: RESULTS
+) -> tuple[Array, Array, Array, RESULTS]:
     """Covariance of the free parameters, gradient in standard errors, bound that each presses on, judged `result`."""
-    information, gradient = information_matrix(problem, model)
+    information, gradient = information_matrix(problem, products)
     rows, values = problem.vehicle.layout.free, problem.vehicle.values()
     at = jnp.array([values[row.name] for row in rows])
     lower, upper = (jnp.array([getattr(row, side) for row in rows]) for side in ("lower", "upper"))
@@ -281,21 +287,21 @@ def judged(vehicle: AbstractVehicle, away: Float[Array, ""], result: RESULTS) ->
     return RESULTS.where(definite, result, RESULTS.indefinite_inertia)
 
 
-def information_matrix(problem: Problem, model: Linearised) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:
+def information_matrix(
+    problem: Problem, products: Float[Array, "r q q"]
+) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:
     r"""Fisher information of the free parameters (physical units) with the initial states eliminated, and the gradient.
 
     $I = \sum_r J_\theta^T J_\theta - J_\theta^T J_x (J_x^T J_x + 1)^{-1} J_x^T J_\theta$ plus the prior's, with $J_x$
-    by initial states in units of their spread, so that a known one, which has none, drops out.
+    by initial states in units of their spread, so that a known one, which has none, drops out. `products` are those of
+    `BlockLinearised`.
     """
-    weight = problem.runs.mask / problem.sigma
-    theta, start = model.theta * weight[..., None], model.start * weight[..., None] * problem.spread
-    residual = model.error / problem.sigma
-    cross = lambda a, b: jnp.einsum("rkcp,rkcq->rpq", a, b)
-    own = cross(start, start) + jnp.eye(len(problem.spread))
-    mixed = cross(theta, start)
+    p = len(problem.prior_mean)
+    own = products[:, p:-1, p:-1] + jnp.eye(len(problem.spread))
+    mixed = products[:, :p, p:-1]
     gain = jnp.linalg.solve(own, jnp.swapaxes(mixed, 1, 2))
-    information = jnp.sum(cross(theta, theta) - mixed @ gain, 0) + jnp.diag(problem.prior_std**-2.0)
+    information = jnp.sum(products[:, :p, :p] - mixed @ gain, 0) + jnp.diag(problem.prior_std**-2.0)
     values = problem.vehicle.values()
     at = [values[row.name] for row in problem.vehicle.layout.free]
     pull = (jnp.stack(at) - problem.prior_mean) / problem.prior_std**2 if at else jnp.zeros(0)
-    return information, jnp.einsum("rkcp,rkc->p", theta, residual) - pull
+    return information, jnp.sum(products[:, :p, -1], axis=0) - pull

@@ -29,6 +29,10 @@ _PART_OF_ACCELERATOR, _LANES_OF_ACCELERATOR = 0.5, 256
 _TURNS = 16
 
 
+# told the passes over all samples that are done, and how many are expected
+Passes = Callable[[float, float], object]
+
+
 class Found(eqx.Module):
     """Where N searches ended.
 
@@ -55,9 +59,17 @@ class AbstractMethod(eqx.Module):
 
     @abc.abstractmethod
     def run(
-        self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
+        self,
+        problem: Problem,
+        starts: Float[Array, "n d"],
+        outputs: Float[Array, "n r k c"] | None = None,
+        passes: Passes | None = None,
     ) -> Found:
-        """Estimate from each of the `starts`; `outputs`, if given, are recordings of their own for each."""
+        """Estimate from each of the `starts`; `outputs`, if given, are recordings of their own for each.
+
+        A method that takes long runs block by block tells `passes` how many passes over all samples it has made, and
+        how many it expects to make.
+        """
 
 
 def objective(y: Float[Array, " d"], problem: Problem) -> Float[Array, ""]:
@@ -72,7 +84,11 @@ class Iterative(AbstractMethod):
     max_steps: int = eqx.field(static=True)
 
     def run(
-        self, problem: Problem, starts: Float[Array, "n d"], outputs: Float[Array, "n r k c"] | None = None
+        self,
+        problem: Problem,
+        starts: Float[Array, "n d"],
+        outputs: Float[Array, "n r k c"] | None = None,
+        passes: Passes | None = None,
     ) -> Found:
         """All starts through pools of lanes. Not to be called in `jit`."""
         return in_shares(pooled, self, problem, starts, outputs)
@@ -126,10 +142,13 @@ def pooled(method: Iterative, problem: Problem, starts: Array, outputs: Array | 
     """A search from each of the starts, `lanes_for` at a time."""
     of, lanes = problems(problem, outputs), lanes_for(problem)
     ends = pool(method.solver, objective, starts, of, lanes=lanes, max_steps=method.max_steps)
-    # without a value at the very start there is nothing that a search could have done
-    never = (ends.steps == 1) & (ends.result == NONFINITE)
-    result = jax.vmap(lambda never, result: RESULTS.where(never, RESULTS.nan_start, result))(never, ends.result)
-    return Found(ends.y, costs(of, ends.y, lanes), ends.steps, result)
+    return Found(ends.y, costs(of, ends.y, lanes), ends.steps, jax.vmap(from_start)(ends.result, ends.steps))
+
+
+def from_start(result: RESULTS, steps: Int[Array, ""]) -> RESULTS:
+    """`result`, which says so where there was no value at the very start and so nothing that a search could do."""
+    never = (steps == 1) & (result == NONFINITE)
+    return RESULTS.where(never, RESULTS.nan_start, result)
 
 
 def problems(problem: Problem, outputs: Array | None) -> Callable[[Int[Array, ""]], Problem]:

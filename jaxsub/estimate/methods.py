@@ -6,6 +6,7 @@ import optimistix as optx
 
 from ..filter.ekf import ExtendedKalmanFilter
 from ..filter.mekf import ModifiedKalmanFilter
+from .blockwise import GaussNewton
 from .combined import Chain
 from .damped import Damped
 from .filtered import Filtered
@@ -16,9 +17,9 @@ from .problem import Problem
 
 
 @functools.cache
-def gauss_newton(tolerance: float = 1e-5) -> Iterative:
+def gauss_newton(tolerance: float = 1e-5) -> GaussNewton:
     """Gauss–Newton with the damping of Levenberg and Marquardt."""
-    return Iterative(Damped(Problem.expand, tolerance, within=Problem.bounds), 60)
+    return GaussNewton(Damped(Problem.expand, tolerance, within=Problem.bounds), 60)
 
 
 @functools.cache

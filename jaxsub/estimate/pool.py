@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optimistix as optx
-from jaxtyping import Array, Float, Int, PyTree
+from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from ..results import NONFINITE, RESULTS, SUCCESSFUL, UNFINISHED
 
@@ -30,6 +30,13 @@ class Ends(eqx.Module):
     y: Float[Array, "n d"]
     steps: Int[Array, " n"]
     result: RESULTS
+
+
+def ending(y: Float[Array, " d"], done: Bool[Array, ""], result: RESULTS) -> tuple[RESULTS, Bool[Array, ""]]:
+    """How a search ends that its solver calls `done`, with that `result`, at `y`; and whether it does, steps apart."""
+    result = RESULTS.where(jnp.all(jnp.isfinite(y)), result, NONFINITE)
+    done = done | (result != SUCCESSFUL)
+    return RESULTS.where(done, result, UNFINISHED), done
 
 
 def pool(
@@ -59,9 +66,7 @@ def pool(
         y, state, _ = solver.step(with_aux, lane.y, own, {}, lane.state, frozenset())
         done, result = solver.terminate(with_aux, y, own, {}, state, frozenset())
         steps = lane.steps + 1
-        result = RESULTS.where(jnp.all(jnp.isfinite(y)), RESULTS.promote(result), NONFINITE)
-        done = done | (result != SUCCESSFUL)
-        result = RESULTS.where(done, result, UNFINISHED)
+        result, done = ending(y, done, RESULTS.promote(result))
         return _Lane(lane.index, y, state, steps), done | (steps >= max_steps), result
 
     def body(carry: tuple[Any, Int[Array, ""], Ends]) -> tuple[Any, Int[Array, ""], Ends]:

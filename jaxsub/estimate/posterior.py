@@ -88,14 +88,13 @@ def _information(found: Fit, problem: Problem, estimated: tuple[bool, ...]) -> F
     """Fisher's of (y, log σ) from the fit's own linearised model; a residual of unit size has 2 in log σ."""
     p = len(found.names)
     _, slope = jax.jvp(problem.transform.to_physical, (problem.origin,), (jnp.ones(p),))
-    weight = (problem.runs.mask / problem.sigma)[..., None]
-    theta, start = found.model.theta * weight * slope, found.model.start * weight * problem.spread
-    corner = jnp.einsum("rkcp,rkcq->pq", theta, theta) + jnp.diag((slope / problem.prior_std) ** 2)
+    products = found.model.products
+    corner = jnp.sum(products[:, :p, :p], axis=0) * jnp.outer(slope, slope) + jnp.diag((slope / problem.prior_std) ** 2)
     noise = jnp.diag(2.0 * problem.runs.samples()[np.flatnonzero(estimated)])
     if found.known_start:
         return jax.scipy.linalg.block_diag(corner, noise)
-    mixed = jnp.einsum("rkcp,rkcs->prs", theta, start).reshape(p, -1)
-    own = jax.scipy.linalg.block_diag(*(jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(start.shape[-1])))
+    mixed = jnp.moveaxis(products[:, :p, p:-1] * slope[:, None], 0, 1).reshape(p, -1)
+    own = jax.scipy.linalg.block_diag(*(products[:, p:-1, p:-1] + jnp.eye(len(problem.spread))))
     return jax.scipy.linalg.block_diag(jnp.block([[corner, mixed], [mixed.T, own]]), noise)
 
 

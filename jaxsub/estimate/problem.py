@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..errors import InputError
-from ..likelihood import errors
+from ..likelihood import Watch, errors, nobody, summed_products
 from ..likelihood.march import March
 from ..parameters import Transform
 from ..recording.runs import Runs
@@ -158,8 +158,11 @@ class Problem(eqx.Module):
     @eqx.filter_jit
     def expand(self, y: Float[Array, " d"]) -> "Expansion":
         """The cost about `y` to second order, its curvature by Gauss and Newton: $J^TJ$."""
+        return self.expansion(y, self.products(y))
+
+    def expansion(self, y: Float[Array, " d"], gram: Float[Array, "r q q"]) -> "Expansion":
+        """`expand` by the `products` at `y`."""
         p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
-        gram = self.products(y)
         prior, slopes = _value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
         among = jnp.sum(gram[:, :p, :p], axis=0) + slopes.T @ slopes
         curvature = Arrow(among, gram[:, :p, p:-1], gram[:, p:-1, p:-1] + jnp.eye(s)) if s else among
@@ -186,6 +189,14 @@ class Problem(eqx.Module):
         error, columns = _value_and_columns(shown, jnp.zeros(p + s))
         every = jnp.concatenate([columns, error[..., None]], axis=-1)
         return jnp.einsum("rkca,rkcb->rab", every, every)
+
+    def products_in_blocks(self, y: Float[Array, " d"], watch: Watch = nobody) -> Float[Array, "r q q"]:
+        """`products`, summed over blocks of samples. Not to be called in `jit`."""
+        vehicle, start, scale = _split(self, y)
+        gram = summed_products(vehicle, self.runs, start, self.sigma, self.spread, watch)
+        p, q = len(self.prior_mean), len(scale)
+        kept = np.array([*range(p), q - 1]) if self.known_start else np.arange(q)
+        return (scale[:, None] * gram * scale)[:, kept[:, None], kept]
 
     @eqx.filter_jit
     def expand_exactly(self, y: Float[Array, " d"]) -> "Expansion":
@@ -224,6 +235,15 @@ def _outputs(problem: Problem, y: Array, moved: Array) -> Float[Array, "r k c"]:
     """Whitened errors at `y`, the initial states of all runs moved by the same `moved` (in their spreads)."""
     vehicle, start = problem.split(y)
     return errors(vehicle, problem.runs, start + problem.spread * moved) / problem.sigma
+
+
+@eqx.filter_jit
+def _split(problem: Problem, y: Array) -> tuple[AbstractVehicle, Array, Float[Array, " q"]]:
+    """Vehicle and initial states at `y`; and the errors' columns by it, in those of the outputs by physical values."""
+    p = len(problem.prior_mean)
+    _, slope = jax.jvp(problem.transform.to_physical, (y[:p],), (jnp.ones(p, y.dtype),))
+    scale = jnp.concatenate([-jnp.where(problem.moving, slope, 0.0), -jnp.ones_like(problem.spread), jnp.ones(1)])
+    return *problem.split(y), scale
 
 
 def _prior(problem: Problem, y: Array) -> Float[Array, " d"]:

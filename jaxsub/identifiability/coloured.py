@@ -22,13 +22,19 @@ from jaxtyping import Array, Bool, Float
 
 from ..estimate import Fit, Problem, estimate_disturbance
 from ..likelihood import (
+    Adjoint,
+    BlockLinearised,
     Columns,
     Disturbance,
     Linearised,
     System,
-    carried,
+    Watch,
+    carried_back,
+    carried_to_start,
     first_guess,
+    nobody,
 )
+from ..recording.runs import Runs
 
 # samples that the disturbance of long runs is estimated from: its few numbers gain nothing from more
 _WINDOWS, _LENGTH = 8, 2500
@@ -53,16 +59,21 @@ class Coloured(eqx.Module):
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
 
 
-def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None) -> Coloured:
+def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None, watch: Watch = nobody) -> Coloured:
     """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed.
 
     The `disturbance` is estimated from the residuals where none is given. Coefficients at a bound are held there.
+    `watch` is told the share of the samples that is done.
     """
     problem, model = fit.problem, fit.model
-    reduced = _reduced(problem, model, fit.pressed != 0.0)
+    reduced = _reduced(problem, model.products, fit.pressed != 0.0)
     if disturbance is None:
-        disturbance = _estimated(*_windows(problem, model), reduced)
-    return Coloured(_sandwich(problem, model, reduced, disturbance), disturbance, fit.names)
+        disturbance = _estimated(problem, *_windows(model), reduced)
+    adjoint = Adjoint.at_end(len(problem.guess), len(problem.spread), len(disturbance.force), len(fit.names))
+    for index in reversed(range(len(model))):
+        adjoint = _back(problem, *model[index], reduced, disturbance, adjoint)
+        watch(1.0 - index / len(model))
+    return Coloured(_sandwich(reduced, disturbance, adjoint), disturbance, fit.names)
 
 
 class _Reduced(NamedTuple):
@@ -82,16 +93,19 @@ class _Reduced(NamedTuple):
 
 
 @eqx.filter_jit
-def _reduced(problem: Problem, model: Linearised, held: Bool[Array, " p"]) -> _Reduced:
-    theta, start, _ = _columns(problem, model, held)
+def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array, " p"]) -> _Reduced:
+    p = len(held)
+    theta = jnp.where(held[:, None] | held, 0.0, products[:, :p, :p])
+    mixed = jnp.where(held, 0.0, products[:, p:-1, :p])
     precision = jnp.where(held, 1.0, problem.prior_std**-2.0)
-    own = jnp.einsum("rkcs,rkct->rst", start, start) + jnp.eye(start.shape[3])
-    gain = jnp.linalg.solve(own, jnp.einsum("rkcs,rkcp->rsp", start, theta))
+    own = products[:, p:-1, p:-1]
+    gain = jnp.linalg.solve(own + jnp.eye(own.shape[-1]), mixed)
     # what is left of the columns once the initial states have followed, and what their priors then say
-    left = theta - start @ gain[:, None]
-    gram = lambda columns: jnp.einsum("...a,...b->ab", columns, columns)
-    pinned = gram(gain) + jnp.diag(precision)
-    basis, untold = _directions(gram(left) + pinned)
+    turned = jnp.swapaxes(gain, 1, 2)
+    across = turned @ mixed
+    left = theta - across - jnp.swapaxes(across, 1, 2) + turned @ own @ gain
+    pinned = jnp.sum(turned @ gain, axis=0) + jnp.diag(precision)
+    basis, untold = _directions(jnp.sum(left, axis=0) + pinned)
     values = problem.vehicle.values()
     at = [values[row.name] for row in problem.vehicle.layout.free]
     away = jnp.where(held, 0.0, problem.prior_mean - jnp.stack(at)) if at else jnp.zeros(0)
@@ -104,54 +118,65 @@ def _reduced(problem: Problem, model: Linearised, held: Bool[Array, " p"]) -> _R
 
 
 @eqx.filter_jit
-def _estimated(problem: Problem, model: Linearised, reduced: _Reduced) -> Disturbance:
+def _estimated(problem: Problem, runs: Runs, model: Linearised, reduced: _Reduced) -> Disturbance:
     """The disturbance of the residuals."""
-    theta, _, residual = _columns(problem, model, reduced.held)
-    system = System.of(model, problem.runs, problem.sigma, problem.spread)
+    theta, _, residual = _columns(problem, runs, model, reduced.held)
+    system = System.of(model, runs, problem.sigma, problem.spread)
     columns = Columns(jnp.concatenate([residual[..., None], theta @ reduced.basis], axis=-1))
     return estimate_disturbance(system, columns, reduced.prior, first_guess(system, residual))
 
 
 @eqx.filter_jit
-def _sandwich(problem: Problem, model: Linearised, reduced: _Reduced, disturbance: Disturbance) -> Float[Array, "p p"]:
-    """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
-    theta, start, _ = _columns(problem, model, reduced.held)
-    system = System.of(model, problem.runs, problem.sigma, problem.spread)
-    basis, untold = reduced.basis, reduced.untold
+def _back(
+    problem: Problem,
+    runs: Runs,
+    model: Linearised,
+    reduced: _Reduced,
+    disturbance: Disturbance,
+    after: Adjoint,
+) -> Adjoint:
+    """The adjoint recursion of the scores' covariance through one block."""
+    theta, start, _ = _columns(problem, runs, model, reduced.held)
+    system = System.of(model, runs, problem.sigma, problem.spread)
     left = theta - start @ reduced.gain[:, None]
-    middle = basis.T @ (carried(disturbance, system, left) + reduced.pinned) @ basis
+    return carried_back(disturbance, system, left, after)
+
+
+@eqx.filter_jit
+def _sandwich(reduced: _Reduced, disturbance: Disturbance, adjoint: Adjoint) -> Float[Array, "p p"]:
+    """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
+    basis, untold = reduced.basis, reduced.untold
+    middle = basis.T @ (carried_to_start(disturbance, adjoint) + reduced.pinned) @ basis
     return basis @ middle @ basis.T + untold @ untold.T
 
 
-def _windows(problem: Problem, model: Linearised) -> tuple[Problem, Linearised]:
-    """All of it where that is no more than `_WINDOWS` windows of `_LENGTH` samples, else so many spread evenly."""
-    runs = problem.runs
-    count, samples = runs.times.shape
-    if count * samples <= _WINDOWS * _LENGTH:
-        return problem, model
+def _windows(model: BlockLinearised) -> tuple[Runs, Linearised]:
+    """All of it where that is one block, else `_WINDOWS` windows of `_LENGTH` samples from where blocks begin."""
+    if model.only is not None:
+        return model.runs, model.only
+    count, samples = model.runs.times.shape
     length = min(samples, _LENGTH)
     chosen = np.linspace(0, count - 1, min(count, _WINDOWS)).round().astype(int)
-    begins = np.linspace(0, samples - length, max(1, _WINDOWS // len(chosen))).round().astype(int)
-
-    def cut(array: Array) -> Array:
-        """The windows, by NumPy, for which no program has to be made."""
-        short = length - (samples - array.shape[1])
-        return jnp.asarray(np.stack([np.asarray(array[r])[a : a + short] for r in chosen for a in begins]))
-
+    latest = (samples - length) // model.length
+    firsts = np.linspace(0, latest, min(latest + 1, max(1, _WINDOWS // len(chosen)))).round().astype(int)
+    parts = [model.window(first, chosen, length) for first in firsts.tolist()]
     arrays = ("times", "step_of", "live", "signals", "outputs", "mask")
-    runs = dataclasses.replace(runs, **{name: cut(getattr(runs, name)) for name in arrays})
-    return dataclasses.replace(problem, runs=runs), jax.tree.map(cut, model)
+    whole = lambda *pieces: jnp.asarray(np.concatenate(pieces))
+    runs = dataclasses.replace(
+        parts[0][0], **{name: whole(*(getattr(part, name) for part, _ in parts)) for name in arrays}
+    )
+    return runs, jax.tree.map(whole, *(linearised for _, linearised in parts))
 
 
-def _columns(problem: Problem, model: Linearised, held: Array) -> tuple[Array, Array, Array]:
+def _columns(problem: Problem, runs: Runs, model: Linearised, held: Array) -> tuple[Array, Array, Array]:
     """`whitened_columns`, those of coefficients at a bound empty."""
-    theta, start, residual = whitened_columns(problem, model)
+    theta, start, residual = whitened_columns(problem, runs, model)
     return jnp.where(held, 0.0, theta), start, residual
 
 
-def whitened_columns(problem: Problem, model: Linearised) -> tuple[Array, Array, Array]:
+def whitened_columns(problem: Problem, runs: Runs, model: Linearised) -> tuple[Array, Array, Array]:
     """Whitened sensitivities to the coefficients (physical) and to the initial states (in their spreads); residuals."""
-    weight = problem.runs.mask / problem.sigma
+    weight = runs.mask / problem.sigma
     theta = model.theta * weight[..., None]
     return theta, model.start * weight[..., None] * problem.spread, model.error / problem.sigma
 

@@ -10,13 +10,13 @@ float type, below the largest. A direction under that is told by nothing, howeve
 import dataclasses
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..estimate import Fit, Problem
-from ..likelihood import Linearised
+from ..likelihood import BlockLinearised, Linearised, Watch, nobody
+from ..recording.runs import Runs
 from .coloured import whitened_columns
 
 FRACTION = 0.5
@@ -43,13 +43,13 @@ class Directions:
     uncertainty: np.ndarray
 
     @classmethod
-    def of(cls, fit: Fit) -> "Directions":
-        """The directions of a fit."""
+    def of(cls, fit: Fit, watch: Watch = nobody) -> "Directions":
+        """The directions of a fit. `watch` is told the share of the samples that is done."""
         problem = fit.problem
         values, given = np.array(list(fit.values.values())), np.asarray(problem.prior_mean)
         size = np.maximum(np.abs(values), np.where(np.isfinite(given), np.abs(given), 0.0))
         size = np.where(size > 0.0, size, np.array(list(fit.standard_errors.values())))
-        triangle = np.asarray(_triangle(problem, fit.model)) * size
+        triangle = _triangle(problem, fit.model, watch) * size
         return cls(fit.names, size, triangle, *_decompose(triangle))
 
     @property
@@ -130,18 +130,25 @@ def _spread(vectors: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:
     return np.where(np.any(np.abs(vectors[:, hidden]) > _ZERO, axis=1), np.inf, known)
 
 
+def _triangle(problem: Problem, model: BlockLinearised, watch: Watch) -> Float[np.ndarray, "p p"]:
+    """R of the whitened Jacobian by the coefficients, physical units, the initial states eliminated.
+
+    By decompositions of blocks and of what they leave: products would lose half the digits. The prior of the initial
+    states is another block.
+    """
+    p, s = len(problem.prior_mean), len(problem.spread)
+    left = np.zeros((len(problem.runs.times), 0, s + p))
+    for index in range(len(model)):
+        left = np.linalg.qr(np.concatenate([left, _block_triangle(problem, *model[index])], axis=1), mode="r")
+        watch((index + 1) / len(model))
+    prior = np.broadcast_to(np.eye(s, s + p), (len(left), s, s + p))
+    rows = np.linalg.qr(np.concatenate([prior, left], axis=1), mode="r")[:, s:, s:].reshape(-1, p)
+    return np.linalg.qr(np.concatenate([rows, np.diag(1.0 / np.asarray(problem.prior_std))]), mode="r")
+
+
 @eqx.filter_jit
-def _triangle(problem: Problem, model: Linearised) -> Float[Array, "p p"]:
-    """R of the whitened Jacobian by the coefficients, physical units, the initial states eliminated."""
-    theta, start, _ = whitened_columns(problem, model)
-    s, p = start.shape[-1], theta.shape[-1]
-
-    def left(theta: Array, start: Array) -> Array:
-        """What no initial state, nor its prior, can follow."""
-        states = jnp.concatenate([start.reshape(-1, s), jnp.eye(s)])
-        columns = jnp.concatenate([theta.reshape(-1, p), jnp.zeros((s, p))])
-        basis = jnp.linalg.qr(states)[0]
-        return columns - basis @ (basis.T @ columns)
-
-    rows = jax.vmap(left)(theta, start).reshape(-1, p)
-    return jnp.linalg.qr(jnp.concatenate([rows, jnp.diag(1.0 / problem.prior_std)]), mode="r")
+def _block_triangle(problem: Problem, runs: Runs, model: Linearised) -> Float[Array, "r q q"]:
+    """R of each run's whitened columns in one block: by its initial state, then by the coefficients."""
+    theta, start, _ = whitened_columns(problem, runs, model)
+    columns = jnp.concatenate([start, theta], axis=-1)
+    return jnp.linalg.qr(columns.reshape(len(columns), -1, columns.shape[-1]), mode="r")

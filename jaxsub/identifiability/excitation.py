@@ -39,11 +39,11 @@ class Excitation:
         states = list(layout.states)
         n = len(layout.equations)
         inputs = [name for name, _ in (*layout.inputs, *layout.prescribed, *layout.environment)]
-        at = jnp.concatenate([fit.model.states, fit.runs.signals], -1).reshape(-1, len(states) + len(inputs))
-        spread = np.std(np.asarray(at), axis=0)
-        mean = jnp.mean(at, axis=0)
-        scale = jnp.where(jnp.asarray(spread) > 0.0, jnp.asarray(spread), 1e-3)
-        by_signal, inertial, driven = (np.asarray(a) for a in _dependence(vehicle, mean, scale))
+        mean, spread = _moments(fit)
+        scale = np.where(spread > 0.0, spread, 1e-3)
+        by_signal, inertial, driven = (
+            np.asarray(a) for a in _dependence(vehicle, jnp.asarray(mean), jnp.asarray(scale))
+        )
         signals = states + inputs
         regressors = {}
         for i, name in enumerate(fit.names):
@@ -65,6 +65,22 @@ class Excitation:
         if inputs:
             return f"move {' and '.join(inputs)} more"
         return f"vary {' and '.join(bases)}, which no recorded input drives" if bases else "record for longer"
+
+
+def _moments(fit: Fit) -> tuple[Float[np.ndarray, " z"], Float[np.ndarray, " z"]]:
+    """Mean and standard deviation of each state and signal, over all samples."""
+    count, mean, squares = 0, np.zeros(()), np.zeros(())
+    for index in range(len(fit.model)):
+        runs, model = fit.model[index]
+        at = np.concatenate([np.asarray(model.states), np.asarray(runs.signals)], axis=-1)
+        # a block's last sample is the next one's first, and what is padded does not count
+        at = at[:, :-1][np.asarray(runs.live)]
+        # joined with those before as by Chan, Golub and LeVeque (1983), Am. Statist. 37
+        away = at.mean(axis=0) - mean
+        squares = squares + at.var(axis=0) * len(at) + away**2 * (count * len(at) / (count + len(at)))
+        mean = mean + away * (len(at) / (count + len(at)))
+        count += len(at)
+    return mean, np.sqrt(squares / count)
 
 
 def _in_words(effect: np.ndarray, inputs: list[str]) -> str:

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from ..estimate import Assessment, Fit, assess
+from ..likelihood import Watch, nobody
 from .directions import FRACTION, Directions, subset
 from .equivalence import Family, equivalent_systems
 from .excitation import Excitation
@@ -94,17 +95,18 @@ class Identifiability:
         return lines + own + of_all
 
 
-def identifiability(fit: Fit, assessment: Assessment | None = None) -> Identifiability:
+def identifiability(fit: Fit, assessment: Assessment | None = None, watch: Watch = nobody) -> Identifiability:
     """The directions that a fit's recordings leave open, and a verdict on each coefficient.
 
     `assessment` says whether the fit explains its runs; it is made of the fit where none is given.
+    `watch` is told the share of the samples that is done.
     """
     if not fit.names:
         return Identifiability(0, 0, [], [])
-    if not np.all(np.isfinite(np.asarray(fit.model.theta))):
+    if not np.all(np.isfinite(np.asarray(fit.model.products))):
         unknown = tuple(Verdict(n, "not converged", np.inf, remedy=_OF_ALL["not converged"]) for n in fit.names)
         return Identifiability(0, len(fit.names), [], [], unknown)
-    directions = Directions.of(fit)
+    directions = Directions.of(fit, watch)
     open_ = np.flatnonzero(directions.open)
     null = []
     for vector in directions.vectors.T[open_]:

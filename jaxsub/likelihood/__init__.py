@@ -1,10 +1,14 @@
 """Likelihoods: how probable a recording is under a model, and how that changes with everything in it."""
 
+from .blocks import BlockLinearised, Watch, block_length, nobody, output_errors, summed_products
 from .disturbance import (
+    Adjoint,
     Columns,
     Disturbance,
     System,
     carried,
+    carried_back,
+    carried_to_start,
     covariance_derivatives,
     first_guess,
     padded_width,
@@ -19,13 +23,19 @@ from .output_error import concentrated_sigma, errors, negative_log_likelihood, r
 from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise, propagate
 
 __all__ = [
+    "Adjoint",
+    "BlockLinearised",
     "Columns",
     "Disturbance",
     "Followed",
     "Jacobians",
     "Linearised",
     "System",
+    "Watch",
+    "block_length",
     "carried",
+    "carried_back",
+    "carried_to_start",
     "concentrated_sigma",
     "covariance_derivatives",
     "errors",
@@ -35,6 +45,8 @@ __all__ = [
     "jacobians",
     "linearise",
     "negative_log_likelihood",
+    "nobody",
+    "output_errors",
     "padded_width",
     "part_products",
     "products",
@@ -42,5 +54,6 @@ __all__ = [
     "residual_outputs",
     "restricted",
     "smoothed",
+    "summed_products",
     "whitened",
 ]

@@ -12,6 +12,8 @@ Thompson 1971), which a Kalman filter of [x, d] gives: coefficients that are fit
 the disturbance, and the restricted likelihood allows for that.
 """
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -188,6 +190,27 @@ def augmented(
     return F.at[..., s:, s:].set(diagonal), B
 
 
+class Adjoint(NamedTuple):
+    """The adjoint recursion of `carried` at one sample.
+
+    **Fields**
+
+    - `lever`: (R, s, p) of the weights on the state. `asked`: (R, n, p) theirs on the force, by the interval that
+      begins here; `following`: (R, n, p) what later samples ask of it. `total`: (p, p) the sum so far.
+    """
+
+    lever: Float[Array, "r s p"]
+    asked: Float[Array, "r n p"]
+    following: Float[Array, "r n p"]
+    total: Float[Array, "p p"]
+
+    @classmethod
+    def at_end(cls, runs: int, states: int, forces: int, columns: int) -> "Adjoint":
+        """Beyond the last sample."""
+        r, s, n, p = runs, states, forces, columns
+        return cls(jnp.zeros((r, s, p)), jnp.zeros((r, n, p)), jnp.zeros((r, n, p)), jnp.zeros((p, p)))
+
+
 def carried(disturbance: Disturbance, system: System, weights: Float[Array, "r k c p"]) -> Float[Array, "p p"]:
     r"""$\sum_r W_r^T\Gamma_r W_r$ with $\Gamma$ the residuals' covariance under `disturbance`, initial states known.
 
@@ -195,26 +218,44 @@ def carried(disturbance: Disturbance, system: System, weights: Float[Array, "r k
     lever on the state, $a_k$ theirs on the force and $f_k = a_k + \rho_k f_{k+1}$, forces of unit variance contribute
     $\sum_k a_kf_k^T + f_ka_k^T - a_ka_k^T$.
     """
-    n, (r, samples), p = len(disturbance.force), weights.shape[:2], weights.shape[-1]
+    end = Adjoint.at_end(len(weights), system.A.shape[-1], len(disturbance.force), weights.shape[-1])
+    adjoint = carried_back(disturbance, system, weights, end)
+    return carried_to_start(disturbance, adjoint)
+
+
+def carried_back(disturbance: Disturbance, system: System, weights: Float[Array, "r k c p"], after: Adjoint) -> Adjoint:
+    """`carried` from a block's last sample, which `after` may know already by later blocks, to its first."""
+    n, intervals = len(disturbance.force), system.intervals.shape[1]
     turned = lambda M: jnp.swapaxes(M, -1, -2)
 
-    def step(carry: tuple[Array, Array, Array], k: Array) -> tuple[tuple[Array, Array, Array], None]:
-        lever, following, total = carry
-        # arrays are indexed and not scanned over, so that none is copied; there is no interval after the last sample
-        interval = lambda M, k: jnp.where((k >= 0) & (k < samples - 1), M[:, jnp.clip(k, 0, samples - 2)], 0.0)
-        asked = turned(interval(system.G, k)[..., :n]) @ lever
-        lever = turned(system.C[:, k]) @ weights[:, k] + turned(interval(system.A, k)) @ lever
-        asked = asked + turned(interval(system.G, k - 1)[..., n:]) @ lever
-        rho = jnp.exp(-interval(system.intervals, k)[:, None] / disturbance.time)
-        following = asked + rho[..., None] * following
-        scaled = disturbance.force[:, None] ** 2 * asked
-        both = jnp.einsum("rnp,rnq->pq", scaled, following)
+    def seen(adjoint: Adjoint, k: Array | int) -> Adjoint:
         white = jnp.where(system.measured[:, k], disturbance.noise, 1.0)[..., None] * weights[:, k]
-        own = jnp.einsum("rcp,rcq->pq", white, white) - jnp.einsum("rnp,rnq->pq", scaled, asked)
-        return (lever, following, total + both + both.T + own), None
+        lever = turned(system.C[:, k]) @ weights[:, k] + adjoint.lever
+        return adjoint._replace(lever=lever, total=adjoint.total + jnp.einsum("rcp,rcq->pq", white, white))
 
-    nothing = jnp.zeros((r, system.A.shape[-1], p)), jnp.zeros((r, n, p)), jnp.zeros((p, p))
-    return jax.lax.scan(step, nothing, jnp.arange(samples), reverse=True)[0][2]
+    def step(adjoint: Adjoint, k: Array) -> tuple[Adjoint, None]:
+        # arrays are indexed and not scanned over, so that none is copied
+        asked = adjoint.asked + turned(system.G[:, k, :, n:]) @ adjoint.lever
+        following, total = _forced(disturbance, adjoint._replace(asked=asked))
+        rho = jnp.exp(-system.intervals[:, k, None] / disturbance.time)
+        before = turned(system.G[:, k, :, :n]) @ adjoint.lever
+        passed = Adjoint(turned(system.A[:, k]) @ adjoint.lever, before, rho[..., None] * following, total)
+        return seen(passed, k), None
+
+    return jax.lax.scan(step, seen(after, intervals), jnp.arange(intervals), reverse=True)[0]
+
+
+def carried_to_start(disturbance: Disturbance, adjoint: Adjoint) -> Float[Array, "p p"]:
+    """`carried`, where the adjoint recursion has come to the first sample."""
+    return _forced(disturbance, adjoint)[1]
+
+
+def _forced(disturbance: Disturbance, adjoint: Adjoint) -> tuple[Float[Array, "r n p"], Float[Array, "p p"]]:
+    """What is asked of the force at a sample and later, and the sum with what that contributes."""
+    following = adjoint.asked + adjoint.following
+    scaled = disturbance.force[:, None] ** 2 * adjoint.asked
+    both = jnp.einsum("rnp,rnq->pq", scaled, following)
+    return following, adjoint.total + both + both.T - jnp.einsum("rnp,rnq->pq", scaled, adjoint.asked)
 
 
 def covariance_derivatives(

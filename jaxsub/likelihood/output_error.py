@@ -22,19 +22,38 @@ def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> 
 
 
 @eqx.filter_jit
-def residual_outputs(vehicle: AbstractVehicle, runs: Runs, modelled: Float[Array, "r k c"]) -> Float[Array, "r k c"]:
+def residual_outputs(
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    modelled: Float[Array, "r k c"],
+    turns: Float[Array, "r c"] | None = None,
+) -> Float[Array, "r k c"]:
     """Measured minus `modelled`, zero where nothing was measured.
 
     Angles are wrapped to (-π, π]. Where their turns are counted only the first sample's is: a model that turns once too
-    often is a turn off, and not right again, so that a search that begins far off finds the way back.
+    often is a turn off, and not right again, so that a search that begins far off finds the way back. `turns` are those
+    of `first_turns` where that sample lies before `runs`, which are then blocks of longer ones.
     """
     error = vehicle.deviation(runs.outputs, modelled)
     if any(runs.counted):
         whole = runs.outputs - modelled
-        first = jnp.take_along_axis(whole, jnp.argmax(runs.mask, axis=1)[:, None], axis=1)
-        whole = whole - _TURN * jax.lax.stop_gradient(jnp.round(first / _TURN))
+        first = first_turns(runs, modelled, turns)
+        whole = whole - _TURN * jnp.where(jnp.isnan(first), 0.0, first)[:, None]
         error = jnp.where(jnp.array(runs.counted), whole, error)
     return jnp.where(runs.mask, error, 0.0)
+
+
+def first_turns(
+    runs: Runs, modelled: Float[Array, "r k c"], before: Float[Array, "r c"] | None = None
+) -> Float[Array, "r c"]:
+    """Whole turns by which each run's first measured sample differs from `modelled`, NaN where none is measured.
+
+    Those `before` `runs`, where they are known, stay.
+    """
+    whole = runs.outputs - modelled
+    first = jnp.take_along_axis(whole, jnp.argmax(runs.mask, axis=1)[:, None], axis=1)[:, 0]
+    own = jnp.where(jnp.any(runs.mask, axis=1), jax.lax.stop_gradient(jnp.round(first / _TURN)), jnp.nan)
+    return own if before is None else jnp.where(jnp.isnan(before), own, before)
 
 
 def concentrated_sigma(error: Float[Array, "r k c"], runs: Runs) -> Float[Array, " c"]:

@@ -5,7 +5,6 @@ $D_{k+1} = A_k D_k + f_k$, so all of them go through it as columns of one batch.
 the sampled step; nothing here depends on how many effects the vocabulary has.
 """
 
-import dataclasses
 from collections.abc import Callable
 
 import equinox as eqx
@@ -13,14 +12,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import AbstractActuator, AbstractInstrument
 from ..recording.runs import Runs
 from ..simulate import Sampled
 from ..vehicle import AbstractVehicle
-from .output_error import residual_outputs
+from .output_error import first_turns, residual_outputs
 
-# samples whose Jacobians are taken at once
-_AT_ONCE = 50_000
+# samples whose steps are differentiated at once: few enough to stay in a core's cache, which takes a third of the time
+# that thousands take
+_SIDE_BY_SIDE = 16
 
 
 class Linearised(eqx.Module):
@@ -88,76 +87,84 @@ def jacobians(
     with_theta = lambda vector: vehicle.with_values(dict(zip(names, vector, strict=True)))
     r, k1, s = before.shape
     p, n = len(names), len(vehicle.layout.equations)
-    flat = before.reshape(r * k1, s)
-    pushes = jnp.zeros((len(flat), 2, n)) if push is None else push.reshape(-1, 2, n)
-    index, live = runs.step_of.reshape(-1), runs.live.reshape(-1)[:, None, None]
+    basis = jnp.eye(p + s + 2 * n)
+    live = runs.live.reshape(-1)[:, None, None]
 
-    def stepped(change: Array) -> Array:
-        parameters, moved, pushed = jnp.split(change, [p, p + s])
-        model = Sampled.of(with_theta(theta + parameters), runs)
-        nodes = jax.vmap(model.vehicle.actuate)(runs.times, runs.nodes())
-        nodes = nodes.reshape(len(flat), 3, nodes.shape[-1])
-        return jax.vmap(model.step)(flat + moved, nodes, index, pushes + pushed.reshape(2, n))
+    def ready(parameters: Array) -> tuple[Sampled, Array]:
+        model = Sampled.of(with_theta(parameters), runs)
+        return model, jax.vmap(model.vehicle.actuate)(runs.times, runs.nodes())
+
+    # the weights of a step have derivatives by the parameters alone, which all samples share
+    of = lambda tangent: jax.jvp(ready, (theta,), (tangent,))
+    (model, nodes), (by_model, by_nodes) = jax.vmap(of, out_axes=(None, 0))(basis[:, :p])
+    numbers, rest = eqx.partition(model, eqx.is_inexact_array)
+    tangents = (eqx.filter(by_model, eqx.is_inexact_array), basis[:, p : p + s], basis[:, p + s :].reshape(-1, 2, n))
+
+    def stepped(sample: tuple[Array, ...]) -> Float[Array, "s q"]:
+        state, node, by_node, index, push = sample
+        step = lambda numbers, state, node, push: eqx.combine(numbers, rest).step(state, node, index, push)
+        along = lambda numbers_, state_, push_, node_: jax.jvp(
+            step, (numbers, state, node, push), (numbers_, state_, node_, push_)
+        )[1]
+        return jax.vmap(along, out_axes=-1)(*tangents, by_node)
+
+    flat = lambda array: array.reshape(r * k1, *array.shape[2:])
+    pushes = jnp.zeros((r, k1, 2, n)) if push is None else push.reshape(r, k1, 2, n)
+    by_nodes = jnp.moveaxis(by_nodes, 0, 2)
+    samples = tuple(map(flat, (before, nodes, by_nodes, runs.step_of, pushes)))
+    columns = jax.lax.map(stepped, samples, batch_size=_SIDE_BY_SIDE)
 
     def shown(change: Array) -> Array:
         parameters, moved = jnp.split(change, [p])
         return with_theta(theta + parameters).measure(runs.times, at + moved, runs.signals)
 
-    F, A, G = jnp.split(_columns(stepped, jnp.zeros(p + s + 2 * n)), [p, p + s], axis=-1)
+    F, A, G = jnp.split(columns, [p, p + s], axis=-1)
     A = jnp.where(live, A, jnp.eye(s)).reshape(r, k1, s, s)
     G, F = (jnp.where(live, M, 0.0).reshape(r, k1, s, M.shape[-1]) for M in (G, F))
     direct, C = jnp.split(_columns(shown, jnp.zeros(p + s)), [p], axis=-1)
     return Jacobians(A, G, C, F, direct)
 
 
-def _jacobians_along(vehicle: AbstractVehicle, runs: Runs, states: Float[Array, "r k s"]) -> Jacobians:
-    """`jacobians` along `states`; of long runs piece by piece, so that intermediate results take a piece's memory."""
-    samples = states.shape[1]
-    pieces = -(-samples * len(states) // _AT_ONCE)
-    # an actuator's or a sensor's own dynamics need what came before a piece
-    if pieces <= 1 or any(isinstance(effect, AbstractActuator | AbstractInstrument) for effect in vehicle.effects):
-        return jacobians(vehicle, runs, states[:, :-1], states)
-    length = -(-(samples - 1) // pieces)
-    begins = length * jnp.arange(pieces)
+class Checkpoint(eqx.Module):
+    """What a linearised model is at one sample of R runs, from which it goes on to the samples that follow.
 
-    def piece(begin: Array) -> Jacobians:
-        # the last begins earlier, so that all are of one length
-        begin = jnp.minimum(begin, samples - 1 - length)
-        cut = lambda array, more: jax.lax.dynamic_slice_in_dim(array, begin, length + more, axis=1)
-        short = dataclasses.replace(
-            runs,
-            times=cut(runs.times, 1),
-            step_of=cut(runs.step_of, 0),
-            live=cut(runs.live, 0),
-            signals=cut(runs.signals, 1),
-            outputs=cut(runs.outputs, 1),
-            mask=cut(runs.mask, 1),
-        )
-        at = cut(states, 1)
-        return jacobians(vehicle, short, at[:, :-1], at)
+    **Fields**
 
-    every = jax.lax.map(piece, begins)
-    last = samples - 1 - length * (pieces - 1)
+    - `state`: (R, s). `by`: (R, s, p+s) the state by the free parameters and by the run's initial state.
+    - `turns`: (R, c) whole turns of the angles' first measured samples (`first_turns`).
+    """
 
-    def joined(parts: Array) -> Array:
-        whole = jnp.moveaxis(parts[:-1, :, :length], 0, 1).reshape(len(states), -1, *parts.shape[3:])
-        return jnp.concatenate([whole, parts[-1][:, length - last :]], axis=1)
+    state: Float[Array, "r s"]
+    by: Float[Array, "r s ps"]
+    turns: Float[Array, "r c"]
 
-    return jax.tree.map(joined, every)
+    @classmethod
+    def at_start(cls, vehicle: AbstractVehicle, start: Float[Array, "r s"]) -> "Checkpoint":
+        """At the first sample, with the initial states `start`."""
+        (r, s), p = start.shape, len(vehicle.layout.free)
+        own = jnp.broadcast_to(jnp.concatenate([jnp.zeros((s, p)), jnp.eye(s)], axis=1), (r, s, p + s))
+        return cls(start, own, jnp.full((r, len(vehicle.layout.channels)), jnp.nan))
+
+
+def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
+    """`vehicle` along its trajectory from the initial states `start`."""
+    return linearise_from(vehicle, runs, Checkpoint.at_start(vehicle, start))[0]
 
 
 @eqx.filter_jit
-def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
-    """`vehicle` along its trajectory from the initial states `start`."""
-    states = Sampled.of(vehicle, runs).states(runs, start)
-    by = _jacobians_along(vehicle, runs, states)
-    r, k1, s, p = by.F.shape
-    forcing = jnp.concatenate([by.F, jnp.zeros((r, k1, s, s))], axis=-1)
-    origin = jnp.broadcast_to(jnp.concatenate([jnp.zeros((s, p)), jnp.eye(s)], 1), (r, s, p + s))
-    sensitivity = by.C @ propagate(by.A, forcing, origin)
-    error = residual_outputs(vehicle, runs, vehicle.measure(runs.times, states, runs.signals))
+def linearise_from(vehicle: AbstractVehicle, runs: Runs, at: Checkpoint) -> tuple[Linearised, Checkpoint]:
+    """`vehicle` along its trajectory from a checkpoint at the first sample of `runs`; and that at their last."""
+    states = Sampled.of(vehicle, runs).states(runs, at.state)
+    by = jacobians(vehicle, runs, states[:, :-1], states)
+    s, p = by.F.shape[-2:]
+    forcing = jnp.concatenate([by.F, jnp.zeros((*by.F.shape[:2], s, s))], axis=-1)
+    along = propagate(by.A, forcing, at.by)
+    sensitivity = by.C @ along
+    modelled = vehicle.measure(runs.times, states, runs.signals)
+    error = residual_outputs(vehicle, runs, modelled, at.turns)
     theta, start = sensitivity[..., :p] + by.direct, sensitivity[..., p:]
-    return Linearised(states, error, by.A, by.G, by.C, theta, start)
+    after = Checkpoint(states[:, -1], along[:, -1], first_turns(runs, modelled, at.turns))
+    return Linearised(states, error, by.A, by.G, by.C, theta, start), after
 
 
 @eqx.filter_jit

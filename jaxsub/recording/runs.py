@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from .recording import Recording
 from .turns import unwrapped, unwrapped_mechanism, without_jumps
@@ -67,23 +67,33 @@ class Runs(eqx.Module):
 
         A sample that two pieces share is measured in the later one.
         """
-        samples = self.times.shape[1]
-        length = -(-(samples - 1) // count)
-        index = length * np.arange(count)[:, None] + np.arange(length + 1)
-        inside = np.minimum(index, samples - 1)
-        between = np.minimum(index[:, :-1], samples - 2)
-        cut = lambda array, at: array[:, at].reshape(count * len(array), *at.shape[1:], *array.shape[2:])
-        owned = (np.arange(length + 1) < length) | (np.arange(count) == count - 1)[:, None]
-        owned = jnp.asarray(owned & (index < samples))
-        real = jnp.asarray(index[:, 1:] < samples)
+        length = -(-(self.times.shape[1] - 1) // count)
+        return self._pieces(length * np.arange(count), length, np.arange(count) == count - 1)
+
+    def block(self, begin: int | Int[Array, ""], length: int) -> "Runs":
+        """The `length` intervals of every run from the sample numbered `begin` on, padded beyond the runs' end.
+
+        The sample that ends a block is measured in the next one; times are those of the whole run.
+        """
+        begins = jnp.asarray(begin)[None]
+        return self._pieces(begins, length, begins + length >= self.times.shape[1] - 1)
+
+    def _pieces(self, begins: ArrayLike, length: int, last: ArrayLike) -> "Runs":
+        """The pieces of `length` intervals from each of the samples `begins`; those `last` measure their end."""
+        samples, begins = self.times.shape[1], jnp.asarray(begins)
+        index = begins[:, None] + jnp.arange(length + 1)
+        inside, between = jnp.minimum(index, samples - 1), jnp.minimum(index[:, :-1], samples - 2)
+        cut = lambda array, at: array[:, at].reshape(-1, *at.shape[1:], *array.shape[2:])
+        owned = (jnp.arange(length + 1) < length) | jnp.asarray(last)[:, None]
+        every = lambda array: jnp.tile(array, (self.times.shape[0], 1))
         return dataclasses.replace(
             self,
             times=cut(self.times, inside),
             step_of=cut(self.step_of, between),
-            live=cut(self.live, between) & jnp.tile(real, (self.times.shape[0], 1)),
+            live=cut(self.live, between) & every(index[:, 1:] < samples),
             signals=cut(self.signals, inside),
             outputs=cut(self.outputs, inside),
-            mask=cut(self.mask, inside) & jnp.tile(owned, (self.times.shape[0], 1))[..., None],
+            mask=cut(self.mask, inside) & every(owned & (index < samples))[..., None],
         )
 
 

@@ -6,8 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import xarray
 
-from ..estimate import MARGIN, Assessment, Found, Problem, Rate, assess_residuals, basins, output_errors
+from ..estimate import MARGIN, Assessment, Found, Problem, Rate, assess_residuals, basins
 from ..estimate.method import problems
+from ..likelihood import output_errors
 from ..results import SUCCESSFUL
 from .plan import Plan
 from .run import OUTCOMES
