@@ -3,9 +3,11 @@
 import contextlib
 import ctypes
 import time
+from collections.abc import Callable
 
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
+from . import terminal
 
 # samples from which on a command says what it will take
 _LONG = 100_000
@@ -13,8 +15,8 @@ _LONG = 100_000
 _BASE, _BY_COLUMN, _BY_STEP = 4.5e8, 6, 2
 # s for programs to be compiled, and for each sample and column of the Jacobian, on one core of 2024
 _COMPILE, _EACH = 20.0, 3e-6
-# what follows the fit takes this part of the fit's own time
-_AFTER = 0.9
+# s in which nothing is said of the time left; and between two lines, on a terminal and on a pipe
+_SILENT, _TERMINAL, _PIPE = 2.0, 0.5, 10.0
 
 # glibc's number for the size from which on memory is mapped, and that size in bytes
 _M_MMAP_THRESHOLD, _MAPPED = -3, 1_000_000
@@ -38,7 +40,6 @@ class Effort:
         self.samples, self.channels = runs.times.size, c
         self.columns = len(layout.free) + s + 1
         self.doubles = _BY_COLUMN * c * self.columns + _BY_STEP * s * (s + 2 * n + c)
-        self.begun = time.monotonic()
 
     def announcement(self) -> str:
         """What the fit of long runs will take, empty where they are short."""
@@ -49,11 +50,32 @@ class Effort:
         size = f"{self.samples} samples of {self.channels} channels"
         return f"{size}: takes about {memory:.1f} GB and {_span(seconds)}; Ctrl-C after the fit keeps the fit"
 
-    def left(self) -> str:
-        """What follows the fit will take about this long, judged by the fit; empty for short runs."""
-        if self.samples < _LONG:
-            return ""
-        return f"; about {_span(_AFTER * (time.monotonic() - self.begun))} left"
+
+class TimeLeft:
+    """Says how many passes over long runs are done, how many are expected, and how long those will take.
+
+    `told` takes the line, which begins with `what`. Nothing is said in the first seconds, nor too often.
+    """
+
+    def __init__(self, told: Callable[[str], object], what: str):
+        self._told, self._what = told, what
+        self._begun = self._said = time.monotonic()
+        self._from: tuple[float, float] | None = None
+        self._every = _TERMINAL if terminal.console.is_terminal else _PIPE
+
+    def __call__(self, done: float, expected: float) -> None:
+        """Tell of passes that are `done` of those `expected`."""
+        now = time.monotonic()
+        if self._from is None:
+            # what came before was compiled, which tells nothing of what is to come
+            self._from = (now, done)
+            return
+        before, already = self._from
+        if now - self._begun < _SILENT or now - self._said < self._every or done <= already:
+            return
+        self._said = now
+        left = (now - before) * max(expected - done, 0.0) / (done - already)
+        self._told(f"{self._what}: {done:.1f} of about {expected:.0f} passes over the samples, {_span(left)} left")
 
 
 def _span(seconds: float) -> str:

@@ -1,9 +1,10 @@
 """Results of commands: they appear whole or not at all, and replace only what jaxsub wrote."""
 
 import errno
+import itertools
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 
 import click
@@ -12,6 +13,9 @@ from ..errors import InputError, OutputError
 from ..storage import Manifest, place, scratch
 from ..storage.whole import flush
 from .options import options
+
+# a folder for the next of a command's results
+Fresh = Callable[[], AbstractContextManager[Path]]
 
 _ANOTHER = "choose another --out"
 _UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO, errno.ENAMETOOLONG)
@@ -85,16 +89,33 @@ def fresh_folder(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Ite
     **Raises** `InputError` where `out` may not be replaced (`require_replaceable`), where another process writes there
     and where nothing can be written there; `OutputError` where writing fails later.
     """
+    with fresh_folders(out, overwrite, inputs) as fresh, fresh() as new:
+        yield new
+
+
+@contextmanager
+def fresh_folders(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Iterator[Fresh]:
+    """As `fresh_folder`, for results that come one after the other: each call gives a folder for the next.
+
+    Each takes the place of the one before, so that what ends the command later leaves the last one at `out`.
+    """
     require_replaceable(out, overwrite, inputs)
     with claimed(out) as folder:
-        new = folder / "new" / out.resolve().name
-        new.mkdir(parents=True)
-        with _told_of(new, out):
-            yield new
-            manifest = Manifest.of_folder(new)
-            manifest.begin(_command())
-            manifest.add_all()
-            _put(new, out, folder, overwrite)
+        number = itertools.count()
+
+        @contextmanager
+        def fresh() -> Iterator[Path]:
+            index = next(number)
+            new = folder / f"new-{index}" / out.resolve().name
+            new.mkdir(parents=True)
+            with _told_of(new, out):
+                yield new
+                manifest = Manifest.of_folder(new)
+                manifest.begin(_command())
+                manifest.add_all()
+                _put(new, out, folder, overwrite or index > 0)
+
+        yield fresh
 
 
 @contextmanager

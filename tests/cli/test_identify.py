@@ -145,11 +145,16 @@ def test_vehicle_without_free_coefficients_is_one_line(files, monkeypatch, capsy
 
 
 def test_long_runs_are_announced_with_memory_and_time_left(files, monkeypatch, capsys):
-    """Claim: where runs are long, standard error says samples, memory and time before the fit, and time left after."""
+    """Claim: where runs are long, memory and time are said before the fit, passes and time left during it."""
     monkeypatch.setattr("jaxsub.cli.effort._LONG", 100)
+    monkeypatch.setattr("jaxsub.likelihood.blocks._SHORT", 100)
+    monkeypatch.setattr("jaxsub.likelihood.blocks._AT_ONCE", 20)
+    for pause in ("_SILENT", "_PIPE"):
+        monkeypatch.setattr(f"jaxsub.cli.effort.{pause}", 0.0)
     arguments = ["jaxsub", "identify", *(str(files / name) for name in ("vehicle.toml", "run.csv"))]
     monkeypatch.setattr("sys.argv", [*arguments, "--out", str(files / "out")])
     main()
     said = capsys.readouterr().err
     assert re.search(r"120 samples of 2 channels: takes about [\d.]+ GB and \d+ s", said)
-    assert re.search(r"about \d+ (s|min) left", said)
+    for stage in ("fitting by gauss-newton", "computing standard errors and identifiability"):
+        assert re.search(rf"{stage}: [\d.]+ of about \d+ passes over the samples, \d+ s left", said)
