@@ -5,18 +5,26 @@ import ctypes
 import time
 from collections.abc import Callable
 
+from ..likelihood import block_length
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from . import terminal
 
 # samples from which on a command says what it will take
 _LONG = 100_000
-# bytes that the program itself takes; doubles kept at once for each column of the channels' Jacobian, and of the step's
-_BASE, _BY_COLUMN, _BY_STEP = 4.5e8, 6, 2
-# s for programs to be compiled, and for each sample and column of the Jacobian, on one core of 2024
-_COMPILE, _EACH = 20.0, 3e-6
-# s in which nothing is said of the time left; and between two lines, on a terminal and on a pipe
-_SILENT, _TERMINAL, _PIPE = 2.0, 0.5, 10.0
+# `identify` on 1 000 000 rows, jax 0.12, two cores of a shared machine, November 2026: one coordinate 1.01 GB and 30 s
+# of CPU from an empty cache, 0.74 GB and 19 s again; six degrees of freedom, 16 coefficients, 10 channels: 1.25 GB.
+# bytes of the program and its compiler, copies of the recording's columns, and copies of the Jacobian of what is
+# linearised at once: a block, or with actuators or sensors that remember all of it
+_BASE, _COPIES, _OF_JACOBIAN = 9.0e8, 4, 2.5
+# s for programs to be compiled, and for each sample, state and column of the Jacobian in a pass: 0.14 and 0.11 µs
+_COMPILE, _EACH = 20.0, 1.2e-7
+# passes over the samples: six of a usual search, one for the statistics, two for what follows
+_PASSES = 9
+
+# s in which nothing is said of the time left, and between two lines, on a terminal and on a pipe; and the share of a
+# pass that tells how long the others will take
+_SILENT, _TERMINAL, _PIPE, _TOLD = 2.0, 0.5, 10.0, 0.02
 
 # glibc's number for the size from which on memory is mapped, and that size in bytes
 _M_MMAP_THRESHOLD, _MAPPED = -3, 1_000_000
@@ -32,22 +40,23 @@ def return_memory() -> None:
 
 
 class Effort:
-    """How much work the fit of a vehicle to runs is, and how long what follows will take."""
+    """What the fit of a vehicle to runs, and what follows it, will take in memory and time."""
 
     def __init__(self, vehicle: AbstractVehicle, runs: Runs):
         layout = vehicle.layout
-        s, n, c = len(layout.states), len(layout.equations), len(layout.channels)
-        self.samples, self.channels = runs.times.size, c
-        self.columns = len(layout.free) + s + 1
-        self.doubles = _BY_COLUMN * c * self.columns + _BY_STEP * s * (s + 2 * n + c)
+        self._samples, self._channels, self._states = runs.times.size, len(layout.channels), len(layout.states)
+        self._recorded = 1 + runs.signals.shape[-1] + self._channels
+        self._columns = len(layout.free) + self._states + 2 * len(layout.equations)
+        self._at_once = block_length(vehicle, runs) * len(runs.times)
 
     def announcement(self) -> str:
         """What the fit of long runs will take, empty where they are short."""
-        if self.samples < _LONG:
+        if self._samples < _LONG:
             return ""
-        memory = (_BASE + 8.0 * self.doubles * self.samples) / 1e9
-        seconds = _COMPILE + _EACH * self.columns * self.samples
-        size = f"{self.samples} samples of {self.channels} channels"
+        jacobian = _OF_JACOBIAN * self._at_once * self._columns * (self._states + self._channels)
+        memory = (_BASE + 8.0 * (_COPIES * self._samples * self._recorded + jacobian)) / 1e9
+        seconds = _COMPILE + _PASSES * _EACH * self._samples * self._columns * self._states
+        size = f"{self._samples} samples of {self._channels} channels"
         return f"{size}: takes about {memory:.1f} GB and {_span(seconds)}; Ctrl-C after the fit keeps the fit"
 
 
@@ -71,7 +80,7 @@ class TimeLeft:
             self._from = (now, done)
             return
         before, already = self._from
-        if now - self._begun < _SILENT or now - self._said < self._every or done <= already:
+        if now - self._begun < _SILENT or now - self._said < self._every or done - already < _TOLD:
             return
         self._said = now
         left = (now - before) * max(expected - done, 0.0) / (done - already)
