@@ -73,11 +73,11 @@ class BlockLinearised(eqx.Module):
     ) -> "BlockLinearised":
         """`vehicle` linearised along its trajectory from the initial states `start`."""
         length, at = block_length(vehicle, runs), Checkpoint.at_start(vehicle, start)
-        begins, errors, total, only = [], [], jnp.zeros(()), None
+        begins, errors, summed, only = [], [], [], None
         for block in _blocks(runs, length, watch):
             begins.append(at)
             model, products, at = _block(vehicle, block, at, sigma, spread)
-            total = total + products
+            summed.append(np.asarray(products))
             errors.append(model.error)
             only = model if block is runs else None
         return cls(
@@ -85,7 +85,7 @@ class BlockLinearised(eqx.Module):
             runs,
             sigma,
             spread,
-            total,
+            jax.device_put(np.sum(summed, axis=0)),
             _joined(errors, runs.times.shape[1], length),
             tuple(begins),
             only,
@@ -130,17 +130,17 @@ def summed_products(
     watch: Watch = nobody,
 ) -> Float[Array, "r q q"]:
     """The `products` of `BlockLinearised` alone."""
-    at, total = Checkpoint.at_start(vehicle, start), jnp.zeros(())
+    at, summed = Checkpoint.at_start(vehicle, start), []
     for block in _blocks(runs, block_length(vehicle, runs), watch):
         _, products, at = _block(vehicle, block, at, sigma, spread)
-        total = total + products
-    return total
+        summed.append(np.asarray(products))
+    return jax.device_put(np.sum(summed, axis=0))
 
 
 def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
     """Measured minus predicted outputs in SI, zero where nothing was measured. Not to be called in `jit`."""
     length, errors, state = block_length(vehicle, runs), [], start
-    turns = jnp.full((len(start), len(vehicle.layout.channels)), jnp.nan)
+    turns = jax.device_put(np.full((len(start), len(vehicle.layout.channels)), np.nan, start.dtype))
     for block in _blocks(runs, length, nobody):
         error, state, turns = _errors(vehicle, block, state, turns)
         errors.append(error)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..recording.runs import Runs
@@ -142,8 +143,10 @@ class Checkpoint(eqx.Module):
     def at_start(cls, vehicle: AbstractVehicle, start: Float[Array, "r s"]) -> "Checkpoint":
         """At the first sample, with the initial states `start`."""
         (r, s), p = start.shape, len(vehicle.layout.free)
-        own = jnp.broadcast_to(jnp.concatenate([jnp.zeros((s, p)), jnp.eye(s)], axis=1), (r, s, p + s))
-        return cls(start, own, jnp.full((r, len(vehicle.layout.channels)), jnp.nan))
+        # by NumPy, for which no program has to be made
+        own = np.broadcast_to(np.eye(s, p + s, p, start.dtype), (r, s, p + s))
+        turns = np.full((r, len(vehicle.layout.channels)), np.nan, start.dtype)
+        return cls(start, *jax.device_put((own, turns)))
 
 
 def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
