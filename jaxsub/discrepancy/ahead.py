@@ -2,8 +2,8 @@
 
 Where the vehicle is unstable, as most are that an autopilot steers, a free run is lost within seconds whatever the
 model. A filter is held to what was measured, and numbers by its innovations come near the truth one effect after the
-other. What is found so is believed if in the end free runs through the held-out runs, begun anew as often as the model
-needs it, err less with all of it.
+other. What is found so is accepted if in the end free runs, begun anew as often as the model needs it, are better with
+all of it.
 """
 
 import dataclasses
@@ -13,32 +13,31 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..effects import AbstractEffect, amplitudes
-from ..estimate import Ended, initial_guess
+from ..effects import AbstractEffect
+from ..estimate import Ended, evaluate, initial_guess
 from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import SUCCESSFUL
 from ..vehicle import AbstractVehicle
+from .cross_validation import LONG_BLOCKS, Comparison, compare, one_step_ahead, simulated
 from .evidence import evidence_of
 from .model import freed, joined, places
 from .programs import make_room
+from .restarts import restarted, starts
 from .selector import Selector
-from .show import HeldOut, Luck, begun_anew, expects, luck, starts
 from .stiffness import substeps_for
-from .trial import Model, Trial
+from .trial import Model, Trial, fitted_model
 from .view import View, led_from, look
 
 # the most pieces into which a run is cut, the fewest samples of one, and of what was measured, the share of variance
 # that a free run may leave
 _PIECES, _FEWEST, _LEFT = 64, 8, 0.1
-# of a number without which an effect would be none
-_AS_NOTHING = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
 class Ahead:
-    """Models with the numbers that innovations have, tried by what comes next on the held-out runs of a trial.
+    """Models with the numbers that innovations have, compared one step ahead.
 
-    The free runs of what they show are those of the model that they were begun from.
+    Their simulation errors are taken to be those of the model that they were begun from.
     """
 
     trial: Trial
@@ -73,38 +72,17 @@ class Ahead:
         more = [effect for effect in vehicle.effects if effect.label not in before]
         return self.with_effects(start, more, best.view.disturbance, [vehicle])
 
-    def without(self, best: Model, effect: AbstractEffect) -> Luck:
-        """What the held-out runs gain by one of a model's effects.
-
-        Without it the other numbers are where innovations would have them by a linear picture, which is close: beside
-        it they are told, and no program is made for a vehicle that has one effect less.
-        """
-        fewer = self._shown(best.shown, best.view, less(best.view, effect))
-        return luck(fewer, best.shown, True, freely=False)
+    def without(self, best: Model, effect: AbstractEffect) -> Comparison:
+        """What is gained by one of a model's effects, of which the columns are left out for the model without it."""
+        fewer = best.predicted._replace(one_step=one_step_ahead(lacking_view(best.view, effect)[0]))
+        return compare(fewer, best.predicted)
 
     def _model(self, model: Model, view: View, effects: Sequence[AbstractEffect]) -> Model:
         start, _ = initial_guess(view.vehicle, view.runs)
         cost = jnp.asarray(-evidence_of(view))
         ended = Ended(view.vehicle, view.runs, start, view.sigma, cost, jnp.asarray(0), SUCCESSFUL)
-        return Model(ended, view, self._shown(model.shown, view, view.vehicle), (*model.added, *effects))
-
-    def _shown(self, shown: HeldOut, view: View, vehicle: AbstractVehicle) -> HeldOut:
-        """What `shown` is with what a `vehicle` expects under the disturbance of a view."""
-        trial, runs = self.trial, self.trial.all_runs(view.runs.substeps)
-        expected = expects(vehicle, runs, trial.chosen, trial.size, trial.sigma, view.disturbance)
-        return dataclasses.replace(shown, expected=expected)
-
-
-def less(view: View, effect: AbstractEffect) -> AbstractVehicle:
-    r"""A view's vehicle with as good as nothing of one effect, $\theta - P_{\cdot a} P_{aa}^{-1} (a - a_0)$."""
-    rows, values, at = view.vehicle.layout.free, view.vehicle.values(), places(view, effect)
-    here = np.array([float(values[row.name]) for row in rows])
-    # a lag or the like that is zero is another kind of thing
-    gone = (0.0 if amplitudes(effect) else _AS_NOTHING) * here[at]
-    moved = here - view.covariance[:, at] @ np.linalg.solve(view.covariance[np.ix_(at, at)], here[at] - gone)
-    moved = np.clip(moved, [row.lower for row in rows], [row.upper for row in rows])
-    moved[at] = gone
-    return view.vehicle.with_values({row.name: jnp.asarray(value) for row, value in zip(rows, moved, strict=True)})
+        predicted = model.predicted._replace(one_step=one_step_ahead(view))
+        return Model(ended, view, predicted, (*model.added, *effects), model.pieces)
 
 
 def lacking(selector: Selector, effect: AbstractEffect) -> Selector:
@@ -112,7 +90,11 @@ def lacking(selector: Selector, effect: AbstractEffect) -> Selector:
 
     Once all others are there. Of a selector that lists what is present too.
     """
-    view = selector.evidence.view
+    return selector.seen_from(*lacking_view(selector.evidence.view, effect))
+
+
+def lacking_view(view: View, effect: AbstractEffect) -> tuple[View, np.ndarray]:
+    """A view of the vehicle without one effect, along the same path, and the (1 + p, 1 + m) sums of columns for it."""
     rows, values = view.vehicle.layout.free, view.vehicle.values()
     own = [i for i, row in enumerate(rows) if row.name.startswith(f"{effect.label}.")]
     others = [i for i in range(len(rows)) if i not in own]
@@ -130,14 +112,14 @@ def lacking(selector: Selector, effect: AbstractEffect) -> Selector:
         prior=keep.T @ view.prior @ keep,
         length=view.length[others],
     )
-    return selector.seen_from(fewer, keep)
+    return fewer, keep
 
 
 def proved(trial: Trial, base: Model, best: Model) -> Model | None:
-    """The `best` model of innovations as free runs show it, if those through the held-out runs err less than `base`'s.
+    """The `best` model of innovations as it is simulated, if it is accepted beside `base`.
 
-    Fitted to free runs if it runs free through the training runs, else begun anew as often as it has to be: to where a
-    free run of an unstable vehicle is lost a search finds numbers that suit it no more than others.
+    Fitted to free runs if it runs free, else begun anew as often as it has to be: to where a free run of an unstable
+    vehicle is lost a search finds numbers that suit it no more than others.
     """
     trial.progress(f"free runs with {', '.join(effect.label for effect in best.added)}")
     pieces = pieces_of(best.view)
@@ -145,12 +127,12 @@ def proved(trial: Trial, base: Model, best: Model) -> Model | None:
         return None
     before, after = base, best
     if pieces > 1:
-        before, after = (in_pieces(trial, model, pieces) for model in (base, best))
+        before, after = (in_pieces(model, pieces) for model in (base, best))
     else:
         fit = freed(best.fit, best.view.vehicle)
         view = look(fit, best.view.disturbance)
-        after = Model(fit, view, trial.held_out(fit, view.disturbance), best.added)
-    return after if luck(before.shown, after.shown, after.stands, freely=True).helps else None
+        after = fitted_model(fit, view, best.added)
+    return after if compare(before.predicted, after.predicted, after.stands).accepted else None
 
 
 def pieces_of(view: View) -> int | None:
@@ -159,7 +141,7 @@ def pieces_of(view: View) -> int | None:
     variance = np.array([np.var(values) if len(values) else np.inf for values in measured])
     pieces = 1
     while pieces <= min(_PIECES, runs.times.shape[1] // _FEWEST):
-        shown = begun_anew(view.vehicle, view.followed, runs, pieces)
+        shown = restarted(view.vehicle, view.followed, runs, pieces)
         rms = concentrated_sigma(residual_outputs(view.vehicle, runs, shown), runs)
         if np.all(np.asarray(rms**2 - view.sigma**2) < _LEFT * variance):
             return pieces
@@ -167,9 +149,11 @@ def pieces_of(view: View) -> int | None:
     return None
 
 
-def in_pieces(trial: Trial, model: Model, pieces: int) -> Model:
+def in_pieces(model: Model, pieces: int) -> Model:
     """A model with its view's numbers, whose free runs are begun anew in every piece from what its filter says."""
     view = model.view
     runs, start = view.runs.segments(pieces), starts(view.followed, pieces)
     ended = Ended(view.vehicle, runs, start, view.sigma, model.fit.cost, model.fit.steps, SUCCESSFUL)
-    return Model(ended, view, trial.held_out(ended, view.disturbance, pieces), model.added)
+    blocks = max(1, LONG_BLOCKS // pieces)
+    predicted = model.predicted._replace(simulation=simulated(evaluate(ended), blocks, known_start=True))
+    return Model(ended, view, predicted, model.added, pieces)

@@ -16,7 +16,8 @@ from .advice import next_manoeuvre
 from .ahead import in_pieces
 from .batch import batch
 from .consistency import assessed, compared, consistent
-from .diagnosis import Candidate, Diagnosis, Gain, Location, Physics, Rival
+from .diagnosis import Candidate, Diagnosis, Location, Physics, Rival
+from .evaluation import evaluated, overlays, test_gain
 from .examine import examine
 from .explain import explained
 from .kinds import leading, missing, right
@@ -25,10 +26,10 @@ from .model import allowing_for
 from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress
-from .show import HeldOut, channel_quality, coefficients, estimates, luck, overlays, run_quality, trades
+from .show import channel_quality, coefficients, estimates, run_quality, trades
 from .stand_in import described
 from .summary import summary
-from .trial import Found, Model, Trial
+from .trial import Found, Model, Trial, fitted_model
 from .validation import beyond_noise, remainders
 from .verdict import Judged
 from .view import View, look
@@ -42,21 +43,20 @@ _SHOWN = 4
 def diagnose(
     vehicle: AbstractVehicle,
     train: Sequence[Recording],
-    held: Sequence[Recording],
+    test: Sequence[Recording],
     *,
     vocabulary: tuple[type[AbstractEffect], ...] | None = None,
     progress: Progress = lambda message: None,
 ) -> tuple[Diagnosis, AbstractVehicle]:
-    """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `held`.
+    """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `test`.
 
-    Returns the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` is told
-    what is being done. **Raises** `InputError` where the recordings lack a column, or the model does not run from the
+    Nothing of the runs `test` takes part in a decision: the models are simulated along them once, at the end. Returns
+    the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` is told what is
+    being done. **Raises** `InputError` where the recordings lack a column, or the model does not run from the
     vehicle file's values or diverges along the recordings.
     """
-    size = len(train)
-    runs = batch(vehicle, [*train, *held])
     progress("fitting the baseline")
-    start = fit(vehicle, runs.take(range(size), size))
+    start = fit(vehicle, batch(vehicle, train))
     if bool(start.result == RESULTS.nan_start):
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
         raise InputError(vehicle.layout.name, "the model does not run from its starting values", remedy)
@@ -68,20 +68,19 @@ def diagnose(
     found = examine(view, vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
-    progress("free runs through what the fit did not see")
-    trial = Trial(runs, range(size, size + len(held)), size, start.sigma, progress, vehicle)
-    baseline = Model(start, found.view, trial.held_out(start, found.view.disturbance), ())
+    trial, baseline = Trial(progress, vehicle), fitted_model(start, found.view, ())
     named, judged, left = explained(trial, baseline, found, vocabulary)
     best, judged = (named, judged) if left is None else described(trial, named, left, judged, vocabulary)
-    if best.shown.pieces > 1:
-        baseline = in_pieces(trial, baseline, best.shown.pieces)
-    return _told(vehicle, train, held, found, field, baseline, named, best, judged)
+    if best.pieces > 1:
+        baseline = in_pieces(baseline, best.pieces)
+    progress("simulating the test runs")
+    return _told(vehicle, train, test, found, field, baseline, named, best, judged)
 
 
 def _told(
     vehicle: AbstractVehicle,
     train: Sequence[Recording],
-    held: Sequence[Recording],
+    test: Sequence[Recording],
     first: Found,
     field: Field,
     baseline: Model,
@@ -90,15 +89,17 @@ def _told(
     judged: Judged,
 ) -> tuple[Diagnosis, AbstractVehicle]:
     """The diagnosis, and the improved vehicle: the `best` model, of which the `named` one has the numbers of names."""
-    layout, before, after = vehicle.layout, baseline.shown, best.shown
+    layout = vehicle.layout
+    before, *rest = evaluated(vehicle, train, test, [baseline, best] if best.added else [baseline], best.pieces)
+    after = rest[0] if rest else before
     start = allowing_for(baseline.view, baseline.fit)
     improved = allowing_for(best.view, best.fit) if best.added else start
     sigma = np.asarray(start.sigma)
     standing = best.added[len(named.added) :]
     models = [("baseline", before), *([("improved", after)] if best.added else [])]
-    remains = {label: remainders(shown.error, held, layout, sigma) for label, shown in models}
+    remains = {label: remainders(shown.error, test, layout, sigma) for label, shown in models}
     channels = channel_quality(improved)
-    assessment = assessed(after.error, held, layout.channels, sigma)
+    assessment = assessed(after.error, test, layout.channels, sigma)
     found = compared(before.rms, after.rms, remains["baseline"], channels, assessment)
     judged = consistent(judged, found, remains[models[-1][0]], assessment)
     where = _where(judged, first, field, train)
@@ -119,10 +120,10 @@ def _told(
         candidates=_became(first.naming.candidates, physics, standing),
         forces=field.traces,
         remaining_forces=traces(best.view, train) if best.added else field.traces,
-        overlays=overlays(held, layout.channels, before, after),
+        overlays=overlays(test, layout.channels, before, after),
         coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, start, improved),
         channels=channels,
-        runs=[*run_quality(train, "train"), *run_quality(held, "held out")],
+        runs=[*run_quality(train, "train"), *run_quality(test, "held out")],
         notes=[
             *judged.notes,
             *disturbance_note(best.view),
@@ -133,11 +134,12 @@ def _told(
         kinds=missing(judged.named) if judged.named else leading(first),
         file_p_value=right(best.view, vehicle),
         remains=remains,
-        gain=_gain(before, after) if best.added else None,
+        gain=test_gain(before, after, best.pieces) if best.added else None,
         history=[(label, in_units(shown.rms)) for label, shown in models],
         explanations=_explanations(judged, improved.vehicle),
         explained=found,
-        findings=_findings(vehicle, [*train, *held]),
+        findings=_findings(vehicle, [*train, *test]),
+        decisions=judged.decisions,
     )
     return diagnosis, improved.vehicle
 
@@ -146,11 +148,6 @@ def _findings(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> tupl
     """What is odd about the vehicle, and what reading and checking the recordings found, of pieces of one run once."""
     of_runs = (finding for run in recordings for finding in run.findings)
     return tuple(dict.fromkeys([*vehicle_findings(vehicle, vehicle.layout.name), *of_runs]))
-
-
-def _gain(before: HeldOut, after: HeldOut) -> Gain:
-    said = luck(before, after, True, freely=True)
-    return Gain(said.free, said.free_probability)
 
 
 def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:

@@ -2,12 +2,14 @@
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 
 from ..findings import Finding
 from ..vehicle import AbstractVehicle
+from .decisions import Decision
 
 Verdict = Literal["none", "named", "ambiguous", "unknown"]
 
@@ -154,11 +156,11 @@ class Remainder:
 
 @dataclasses.dataclass(frozen=True)
 class Gain:
-    """The share of squared errors that is `left` of free runs through what no fit saw, and how probable it is `luck`
-    that any is gone."""
+    """The `ratio` of squared simulation errors on the test runs, improved model to baseline, and the `p_value` of so
+    large a fall by chance."""
 
-    left: float
-    luck: float
+    ratio: float
+    p_value: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -232,7 +234,7 @@ class Diagnosis:
     or the environment, by what was accepted and its rivals; where nothing was, by what a first look finds most of,
     which may be random forces and noise alone (`disturbance`). `file_p_value` is how probable the numbers found are
     where those of the vehicle file are right. `explained` is what the effects remove of the test runs' error, and
-    `findings` is what reading and checking the recordings found.
+    `findings` is what reading and checking the recordings found, and `decisions` are all choices in order.
     """
 
     verdict: Verdict
@@ -259,6 +261,7 @@ class Diagnosis:
     explanations: tuple[AbstractVehicle, ...] = ()
     explained: Explained | None = None
     findings: tuple[Finding, ...] = ()
+    decisions: Sequence[Decision] = ()
 
     @property
     def improves(self) -> bool:
@@ -315,6 +318,7 @@ class Diagnosis:
             "left": self.explained.left if self.explained else {},
             "held_out_gain": dataclasses.asdict(self.gain) if self.gain else None,
             "next_manoeuvre": self.next_manoeuvre,
+            "decisions": [decision.to_json() for decision in self.decisions],
             "notes": self.notes,
             "warnings": [finding.to_json() for finding in self.findings],
         }

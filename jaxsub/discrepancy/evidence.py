@@ -42,6 +42,12 @@ class Gains(NamedTuple):
     amplitudes: list[np.ndarray]
 
 
+def integrated(gram: Float[np.ndarray, "q q"]) -> float:
+    r"""$\ln\int e^{-\frac12 |r + Ja|^2}da$, but for $2\pi$, by the products of [r, J], priors of a included."""
+    squares = gram[0, 0] - gram[1:, 0] @ np.linalg.solve(gram[1:, 1:], gram[1:, 0])
+    return -0.5 * float(squares + np.linalg.slogdet(gram[1:, 1:])[1])
+
+
 @dataclasses.dataclass(frozen=True)
 class Products:
     """Products of all columns under one disturbance.
@@ -150,10 +156,10 @@ class Products:
         return gram[np.ix_(index, index)] + np.diag(worth)
 
     def _integrated(self, gram: np.ndarray, chosen: Sequence[int]) -> float:
-        r"""$\ln\int e^{-\frac12 r^T r}$ over the free parameters and amplitudes, but for $2\pi$: by products `gram`."""
-        block, with_residual = self._block(gram, chosen), gram[self._index(chosen), 0]
-        squares = gram[0, 0] - with_residual @ np.linalg.solve(block, with_residual)
-        return -0.5 * float(squares + np.linalg.slogdet(block)[1])
+        """`integrated` over the free parameters and the amplitudes of `chosen`, by products `gram` of all."""
+        index = [0, *self._index(chosen)]
+        worth = np.repeat([0.0, 1.0 / self.samples], [self.known, len(chosen)])
+        return integrated(gram[np.ix_(index, index)] + np.diag(worth))
 
     def _left(self, chosen: Sequence[int], more: Sequence[int] | None = None) -> np.ndarray:
         """(1 + q, 1 + q) products of the residual and candidates, less what `chosen` and parameters take up.

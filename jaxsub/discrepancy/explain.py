@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from ..effects import AbstractEffect
 from ..results import RESULTS
+from .cross_validation import compare
 from .evidence import evidence_of
 from .examine import examine, weighed
 from .many import by_what_comes_next
 from .name import MOST_EFFECTS
-from .show import luck
 from .trial import Found, Model, Trial, tried, worth_trying
 from .verdict import EXPLAINED, NOTHING, Judged, both, by_fit, idle, judge
 from .whiteness import share_of
@@ -26,7 +26,7 @@ def explained(
 
     Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
     they leave is not random: far from the truth a linear picture shows the largest alone. Where the baseline does not
-    run free, and where the held-out runs refuse all that was named, what comes next is asked, once; and where the
+    run free, and where all that was named is rejected, what comes next is asked, once; and where the
     mismatch is then beyond doubt still, the rest of the vocabulary.
     """
     best, judged, refusals = baseline, NOTHING, 0
@@ -67,7 +67,7 @@ def explained(
 def without_idle(
     trial: Trial, baseline: Model, best: Model, judged: Judged, older: Sequence[AbstractEffect]
 ) -> tuple[Model, Judged]:
-    """The model less those `older` effects that the held-out runs ask for no more, and what is then to be said.
+    """The model less those `older` effects that are not accepted any more, and what is then to be said.
 
     What was added first may have stood in for what came after it.
     """
@@ -76,9 +76,9 @@ def without_idle(
         fewer = trial.with_effects(
             baseline, [e for e in best.fit.vehicle.effects if e.label in others], best.view.disturbance
         )
-        stands = any(luck(fewer.shown, best.shown, True, freely=freely).helps for freely in (False, True))
-        if not stands and fewer.stands:
-            best, judged = fewer, idle(judged, effect.label, others)
+        comparison = compare(fewer.predicted, best.predicted)
+        if not comparison.accepted and fewer.stands:
+            best, judged = fewer, idle(judged, effect.label, others, comparison)
     return best, judged
 
 

@@ -1,7 +1,7 @@
 """Many effects that are missing at once, one look after the other, by what comes next.
 
 A free run that errs for many causes asks for what does what all of these do. So innovations are asked what is missing
-and how large it is, until they ask for nothing more that predicts the held-out runs; and free runs then judge it all.
+and how large it is, until they ask for nothing more that is accepted; and free runs then judge it all.
 """
 
 import dataclasses
@@ -11,12 +11,13 @@ import numpy as np
 
 from ..effects import AbstractEffect
 from .ahead import Ahead, lacking, proved
+from .cross_validation import Comparison, compare
 from .examine import listed, weighed
 from .model import p_value
 from .name import Named, asked_still, named_on, refitted, standing
+from .rivals import told_apart
 from .selector import SIGNIFICANCE, Selector
-from .show import Luck, luck
-from .trial import Model, Trial, Tries, by_all_runs, upright, worth_trying
+from .trial import Model, Trial, Tries, upright, worth_trying
 from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
 
 # effects beyond which no more are sought, and sets that may be refused
@@ -30,9 +31,7 @@ _LOST = 0.1
 def by_what_comes_next(
     trial: Trial, base: Model, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged] | None:
-    """The model with what the next sample asks for, and what is to be said, if free runs through the held-out runs bear
-    it out.
-    """
+    """The model with what the next sample asks for, and what is to be said, if it is accepted as a whole."""
     ahead = Ahead(trial)
     search = _Search(ahead, ahead.begin(base), vocabulary)
     best, named = search.start, list[Named]()
@@ -45,7 +44,7 @@ def by_what_comes_next(
         chosen = worth_trying(found, said)
         if not chosen:
             break
-        grown = search.grown(Tries(ahead.with_effects, best, found, False), chosen, named)
+        grown = search.grown(Tries(ahead.with_effects, best, found), chosen, named)
         if grown is None:
             fallen.add(selector.candidates[chosen[0]].label)
             refusals += 1
@@ -61,7 +60,7 @@ def by_what_comes_next(
     judged = settled(judged, named)
     for one in named:
         judged = helped(judged, one.effect, gains[one.effect.label])
-    return whole, by_all(judged, whole.shown.pieces)
+    return whole, by_all(judged, whole.pieces)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,10 +80,10 @@ class _Search:
     def grown(
         self, tries: Tries, chosen: Sequence[int], named: Sequence[Named]
     ) -> tuple[Model, list[Named], set[str]] | None:
-        """The model with those of `chosen` and of what was `named` before that the held-out runs ask for beside each
-        other, if they gain, and what they refuse; or with the first of them alone where the others lead astray.
+        """The model with those of `chosen` and of what was `named` before that are accepted beside each other, if they
+        gain, and the labels of those rejected; or with the first of them alone where the others lead astray.
 
-        One that they refuse takes none of the others along. What is chosen first does most, and of what is so large a
+        One that is rejected takes none of the others along. What is chosen first does most, and of what is so large a
         linear picture sees other things in its place.
         """
         before = tries.model([])
@@ -92,7 +91,7 @@ class _Search:
             kept = upright(tries, some)
             more = [*named, *standing(tries.found.selector, kept)]
             model, stand, _ = asked_for(self.ahead, self.start, tries.model(kept), more)
-            if luck(before.shown, model.shown, model.stands, freely=False).helps:
+            if compare(before.predicted, model.predicted, model.stands).accepted:
                 return model, stand, {one.effect.label for one in more} - {one.effect.label for one in stand}
         return None
 
@@ -106,7 +105,7 @@ class _Search:
             one, others = self._beside(best, every, one)
             tried = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
             tried = [(effect, model) for effect, model in tried if model.admitted] or tried[:1]
-            values = by_all_runs([model for _, model in tried], [-float(model.fit.cost) for _, model in tried])
+            values = told_apart([-float(model.fit.cost) for _, model in tried], [m.predicted for _, m in tried])
             fits = [(effect, model, value) for (effect, model), value in zip(tried, values, strict=True)]
             effect, model, _ = max(fits, key=lambda fit: (fit[1].stands, fit[2]))
             if model is best:
@@ -147,19 +146,19 @@ class _Search:
 
 def asked_for(
     ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
-) -> tuple[Model, list[Named], dict[str, Luck]]:
-    """The model with those of `named` that the held-out runs ask for beside the others, and what they gain by each."""
+) -> tuple[Model, list[Named], dict[str, Comparison]]:
+    """The model with those of `named` that are accepted beside the others, and what is gained by each."""
     while named and best.view.finite:
         gains = {one.effect.label: ahead.without(best, one.effect) for one in named}
-        luck_of = {one.effect.label: p_value(best.view, one.effect) for one in named}
-        # first of all what is not told, then what the held-out runs do not ask for, the least first
-        asked = lambda label, gains=gains, luck_of=luck_of: (
-            -max(luck_of[label], SIGNIFICANCE),
-            gains[label].helps,
-            np.nan_to_num(gains[label].likelihood),
+        p_values = {one.effect.label: p_value(best.view, one.effect) for one in named}
+        # first of all what is not significant, then what is not accepted, the least gain first
+        asked = lambda label, gains=gains, p_values=p_values: (
+            -max(p_values[label], SIGNIFICANCE),
+            gains[label].accepted,
+            np.nan_to_num(gains[label].one_step.total),
         )
         worst = min(gains, key=asked)
-        if gains[worst].helps and luck_of[worst] < SIGNIFICANCE:
+        if gains[worst].accepted and p_values[worst] < SIGNIFICANCE:
             return best, [*named], gains
         named = [one for one in named if one.effect.label != worst]
         best = ahead.instead(start, best, worst)

@@ -5,33 +5,27 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import special
 
-from .show import HeldOut, block_gains
+from .cross_validation import Predicted
 
 # the least variance of a difference in log evidence: of models that expect the same it is none
 _TINY = 1e-12
 
 
-def told_apart(evidence: Sequence[float], shown: Sequence[HeldOut], samples: int) -> list[float]:
-    r"""Log evidence of models by all runs: by `samples` that they were fitted to, and what is `shown` on the others.
+def told_apart(evidence: Sequence[float], predicted: Sequence[Predicted]) -> list[float]:
+    r"""Log `evidence` of models, of which each is behind the best by as much as is `believed`.
 
-    As the others are predicted from those fitted, evidence is of both, $\ln p(y) + \ln p(y' | y)$. A model is behind
-    the best by as much of that as is `believed`, whose variance is told by B blocks of the n' other samples,
-    $s^2 = (1 + n/n') B\,\mathrm{var}(t)$ with t by how much each prefers the best: the n that were fitted are taken to
-    be like them. Only the evidence of the fits counts where all diverge along the others.
+    The variance of a difference in log evidence is that of the sum of what each of n blocks of the training runs,
+    `predicted` from the others, prefers the best by: $s^2 = n\,\mathrm{var}(t)$. A model that diverges has none.
     """
-    whole = np.array(evidence) + [sum(float(run.sum()) for run in one.expected) for one in shown]
+    whole = np.array(evidence)
     best = int(np.argmax(whole))
     if not np.isfinite(whole[best]):
         return [*evidence]
-    leader = shown[best].expected
-    # where nothing was measured nothing is added to the likelihood
-    others = sum(np.count_nonzero(run) for run in leader)
-    for i, one in enumerate(shown):
-        if not np.isfinite(whole[i]):
-            continue
-        blocks = block_gains(leader, one.expected)
-        variance = (1.0 + samples / max(others, 1)) * len(blocks) * float(np.var(blocks, ddof=1))
-        whole[i] = whole[best] - believed(whole[best] - whole[i], variance)
+    for i, one in enumerate(predicted):
+        blocks = predicted[best].one_step - one.one_step
+        if np.isfinite(whole[i]) and np.all(np.isfinite(blocks)):
+            variance = len(blocks) * float(np.var(blocks, ddof=1))
+            whole[i] = whole[best] - believed(whole[best] - whole[i], variance)
     return whole.tolist()
 
 

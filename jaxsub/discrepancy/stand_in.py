@@ -1,7 +1,7 @@
 """What has no name, described: effects that stand in for it in free runs, and a smooth force beside them.
 
 A name claims a cause, and needs evidence that it is this one and no other. A model is to be used all the same. So what
-makes its free runs err less, on runs that no fit saw too, may stand in it and claims nothing: some effects of the
+makes its simulation better, in cross-validation, may stand in it and claims nothing: some effects of the
 vocabulary, and a smooth force of one variable. What was named is fitted again beside it, unless the two are so much
 alike, such as friction and any force of the rate, that the recordings would not tell its numbers any more: then it
 keeps them.
@@ -14,16 +14,16 @@ import numpy as np
 
 from ..effects import AbstractEffect, AbstractInstrument, parameter_table
 from ..likelihood import Disturbance
+from .cross_validation import compare
 from .examine import listed, weighed
 from .model import allowing_for, sound
 from .selector import Selector
-from .show import Luck, luck
 from .trial import Found, Model, Trial
 from .verdict import Judged, helped, standing_in
 
 # effects that stand in at a time, sets of them that are fitted, and times that more are asked for
 _AT_ONCE, _TRIES, _TIMES = 4, 5, 3
-# of the squared errors of a free run, the share that each must explain on the training runs, and all on the held-out
+# of the squared errors of a free run, the share that each must explain, and all must remove in cross-validation
 _ENOUGH, _LITTLE = 0.05, 0.01
 # times a standard error, to which it may grow beside a description
 _ABOUT = 2.0
@@ -49,7 +49,7 @@ def described(
 
 
 def _with_more(trial: Trial, named: Model, model: Model, selector: Selector) -> Model | None:
-    """The model with what free runs ask for most, if those through the held-out runs err less with it.
+    """The model with what free runs ask for most, if it is accepted.
 
     What comes out of a fit with numbers that physics does not admit is asked for no more, and others instead; of what
     does not help only the first half is tried again.
@@ -71,18 +71,13 @@ def _with_more(trial: Trial, named: Model, model: Model, selector: Selector) -> 
 
 
 def _worth(model: Model, more: Model) -> bool:
-    """Whether what stands in explains some of the free runs that no fit saw, and the training runs better.
+    """Whether what stands in is accepted and removes some of the simulation error.
 
-    What hardly changes anything may do so without luck, and would then ask for a round of fits more.
+    What hardly changes anything may do so significantly, and would then ask for a round of fits more.
     """
-    gain = luck(model.shown, more.shown, True, freely=True)
-    better = gain.free < 1.0 - _LITTLE and float(more.fit.cost) < float(model.fit.cost)
-    return more.view.finite and _helpful(gain) and better
-
-
-def _helpful(gain: Luck) -> bool:
-    """Whether free runs err less, and none diverges."""
-    return gain.helps and bool(np.isfinite(gain.likelihood))
+    gain = compare(model.predicted, more.predicted)
+    better = gain.ratio < 1.0 - _LITTLE and float(more.fit.cost) < float(model.fit.cost)
+    return more.view.finite and gain.accepted and better
 
 
 def _fitted(
@@ -128,7 +123,7 @@ def freest(selector: Selector) -> list[AbstractEffect]:
 
 
 def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
-    """The model with the force without a name, if what comes next or free runs stand on the held-out runs.
+    """The model with the force without a name, if it is accepted.
 
     How far from zero it is was asked of its shape in detail, and its few knots may overdo it: so half of that is tried,
     and less where free runs err less with it.
@@ -140,12 +135,10 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
     for share in _SHARES:
         less = dataclasses.replace(force, spread=share * force.spread)
         more = _fitted(trial, named, base, [less], disturbance)
-        gain = luck(base.shown, more.shown, more.admitted, freely=False)
-        freely = gain._replace(freely=True)
-        gain = freely if _helpful(freely) and not gain.helps else gain
-        if gain.helps and more.view.finite:
+        gain = compare(base.predicted, more.predicted, more.admitted)
+        if gain.accepted and more.view.finite:
             return more, helped(judged, less, gain)
-        if gain.free > last:
+        if gain.ratio > last:
             break
-        last = gain.free
+        last = gain.ratio
     return base, helped(judged, force, gain)

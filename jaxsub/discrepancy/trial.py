@@ -1,17 +1,16 @@
-"""Effects put into the model, fitted, and tried on runs that no fit saw."""
+"""Effects put into the model, fitted, and compared with the model without them."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array
 
 from ..effects import AbstractEffect
-from ..estimate import Ended
+from ..estimate import Ended, Fit
 from ..likelihood import Disturbance
-from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
+from .cross_validation import Comparison, Predicted, compare, one_step_ahead, simulated
 from .evidence import evidence_of
 from .generic import Pattern, most_explained
 from .model import freed, join, p_value, sound, told
@@ -20,7 +19,6 @@ from .programs import make_room
 from .progress import Progress
 from .rivals import told_apart
 from .selector import SIGNIFICANCE, Selector
-from .show import HeldOut, Luck, hold, luck
 from .stiffness import substeps_for, substeps_unseen
 from .verdict import Judged, helped, settled
 from .view import View, look
@@ -59,12 +57,16 @@ class Found:
 
 
 class Model(NamedTuple):
-    """Where a search ended, its view, what it shows on the held-out runs, and the effects added to the baseline."""
+    """Where a search ended, its view, how it predicts blocks of the training runs, the effects added to the baseline.
+
+    Its simulations are begun anew in each of `pieces` of a run.
+    """
 
     fit: Ended
     view: View
-    shown: HeldOut
+    predicted: Predicted
     added: tuple[AbstractEffect, ...]
+    pieces: int = 1
 
     @property
     def admitted(self) -> bool:
@@ -79,15 +81,8 @@ class Model(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Trial:
-    """The runs that no fit saw: numbers `chosen` of `runs`, of which the first `size` were fitted.
+    """How models with more effects are made: `file` is the vehicle as its user describes it, `progress` is told."""
 
-    `file` is the vehicle as its user describes it.
-    """
-
-    runs: Runs
-    chosen: Sequence[int]
-    size: int
-    sigma: Array
     progress: Progress
     file: AbstractVehicle
 
@@ -98,7 +93,7 @@ class Trial:
         disturbance: Disturbance,
         near: Sequence[AbstractVehicle] = (),
     ) -> Model:
-        """A model with `effects` more, fitted again and tried; the `disturbance` is where one may look for its own.
+        """A model with `effects` more, fitted again; the `disturbance` is where one may look for its own.
 
         The fit begins at vehicles with these effects that are `near` too.
         """
@@ -114,37 +109,25 @@ class Trial:
             runs = dataclasses.replace(joined.runs, substeps=substeps)
             joined = freed(dataclasses.replace(joined, runs=runs), joined.vehicle)
         view = look(joined, disturbance)
-        return Model(joined, view, self.held_out(joined, view.disturbance), (*model.added, *effects))
-
-    def held_out(self, fit: Ended, disturbance: Disturbance, pieces: int = 1) -> HeldOut:
-        """A fit's vehicle on them, each cut into `pieces`."""
-        return hold(
-            fit.vehicle, self.all_runs(fit.runs.substeps), self.chosen, self.size, self.sigma, disturbance, pieces
-        )
-
-    def all_runs(self, substeps: int) -> Runs:
-        """The runs with so many steps in a sample interval."""
-        return dataclasses.replace(self.runs, substeps=substeps)
+        return fitted_model(joined, view, (*model.added, *effects))
 
 
-def by_all_runs(models: Sequence[Model], evidence: Sequence[float]) -> list[float]:
-    """Log evidence of models in each other's place by all runs, of that by the runs that they were fitted to."""
-    samples = int(np.sum(np.any(np.asarray(models[0].view.followed.system.measured), axis=-1)))
-    return told_apart(evidence, [model.shown for model in models], samples)
+def fitted_model(fit: Fit, view: View, added: tuple[AbstractEffect, ...]) -> Model:
+    """The model of a fit and of the view of it."""
+    return Model(fit, view, Predicted(one_step_ahead(view), simulated(fit)), added)
 
 
 class Tries:
     """Models with some of the candidates of one look at the recordings, by number, each fitted once.
 
-    `make` puts effects into a model as `Trial.with_effects` does. `freely` says whether it was a free run that asked
-    for them, which then judges them.
+    `make` puts effects into a model as `Trial.with_effects` does.
     """
 
-    def __init__(self, make: Callable[..., Model], base: Model, found: Found, freely: bool):
-        self.make, self.found, self.freely = make, found, freely
+    def __init__(self, make: Callable[..., Model], base: Model, found: Found):
+        self.make, self.found = make, found
         self.models: dict[tuple[int, ...], Model] = {(): base}
         self.values: dict[tuple[int, ...], float] = {}
-        self.said: dict[int, Luck] = {}
+        self.said: dict[int, Comparison] = {}
 
     def effects(self, numbers: Sequence[int]) -> list[AbstractEffect]:
         """With the numbers that are predicted for each beside the others."""
@@ -185,19 +168,13 @@ class Tries:
         return [i for i in sorted(luck, key=lambda i: -luck[i]) if not luck[i] < SIGNIFICANCE]
 
     def helps(self, fewer: Sequence[int], more: int) -> bool:
-        """Whether one more on top of `fewer` stands on the held-out runs; what was found is kept in `said`."""
-        self.said[more] = self.gain(fewer, [*fewer, more])
-        return self.said[more].helps
+        """Whether one more on top of `fewer` is accepted; what was found is kept in `said`."""
+        self.said[more] = self.compared(fewer, [*fewer, more])
+        return self.said[more].accepted
 
-    def gain(self, fewer: Sequence[int], more: Sequence[int]) -> Luck:
-        """What the held-out runs gain from the one set to the other.
-
-        Sound if the training runs tell more than before once it is fitted: a linear picture may promise too much, and a
-        little is gained by whatever bends.
-        """
-        before, after = self.model(fewer).shown, self.model(more).shown
-        kept = self.freely or self.value(more) > self.value(fewer)
-        return luck(before, after, self.sound(more) and kept, freely=self.freely)
+    def compared(self, fewer: Sequence[int], more: Sequence[int]) -> Comparison:
+        """What is gained from the one set to the other."""
+        return compare(self.model(fewer).predicted, self.model(more).predicted, self.sound(more))
 
     def value(self, numbers: Sequence[int]) -> float:
         """Log evidence of the fit with these; minus infinity where physics does not admit its numbers."""
@@ -208,15 +185,15 @@ class Tries:
         return self.values[key]
 
     def closest(self, others: Sequence[int], index: int) -> Fits:
-        """A candidate and its twins, the `others` beside them, with the log evidence of all runs; the best first.
+        """A candidate and its twins, the `others` beside them, with the log evidence of their fits; the best first.
 
         Those whose fits do not stand come last: what the recordings do not tell from nothing beside a coefficient that
         does the same may be as probable as what they do, and is its rival.
         """
         twins = [number for number in named_on(self.found.selector, others, index).twins if number not in others]
         numbers = [index, *twins]
-        models = [self.model([*others, i]) for i in numbers]
-        values = by_all_runs(models, [self.value([*others, i]) for i in numbers])
+        predicted = [self.model([*others, i]).predicted for i in numbers]
+        values = told_apart([self.value([*others, i]) for i in numbers], predicted)
         fits = zip(numbers, values, strict=True)
         return sorted(fits, key=lambda fit: (not self.sound([*others, fit[0]]), -fit[1]))
 
@@ -224,12 +201,11 @@ class Tries:
 def together(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
     """As many of `chosen` as stand together, each as the best of its twins; nothing if none do.
 
-    What the held-out runs do not ask for is left out: what is left out wrongly is found again from a model with the
-    others.
+    What is not accepted beside the others is left out: what is left out wrongly is found again from a model with them.
     """
     while chosen:
         kept = borne_out(tries, chosen)
-        if not kept or not tries.gain([], [*kept]).helps:
+        if not kept or not tries.compared([], [*kept]).accepted:
             return {}
         idle = next((i for i in reversed([*kept]) if not tries.helps([j for j in kept if j != i], i)), None)
         if idle is None:
@@ -262,7 +238,7 @@ def upright(tries: Tries, chosen: Sequence[int]) -> Sequence[int]:
 def alone(tries: Tries, chosen: Sequence[int]) -> dict[int, Fits]:
     """The first that stands by itself of `chosen` and their twins, the most probable fit first; with its rivals.
 
-    A twin that the training runs find more probable and the held-out runs refuse is none of its rivals.
+    A twin that is more probable and not accepted is none of its rivals.
     """
     for fits in sorted((tries.closest([], index) for index in chosen), key=lambda fits: -fits[0][1]):
         for place, (index, _) in enumerate(fits):
@@ -284,18 +260,18 @@ def leading(selector: Selector, chosen: Sequence[int]) -> list[int]:
 
 
 def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
-    """The model with those of `chosen` that stand on the held-out runs, and what is then to be said.
+    """The model with those of `chosen` that are accepted, and what is then to be said.
 
     The one that leads, or all together, or else the best that stands alone: where the model errs much, a linear
     picture adds effects that only make up for each other, and one of them put into the model shows what is left.
     Where none does, those that were fitted are no candidates of `found` any more.
     """
     freely = not found.selector.freely.isdisjoint(chosen)
-    tries, effects = Tries(trial.with_effects, base, found, freely), found.selector.candidates
+    tries, effects = Tries(trial.with_effects, base, found), found.selector.candidates
     kept = alone(tries, leading(found.selector, chosen))
     if not kept and len(chosen) > 1:
         kept = together(tries, chosen) or alone(tries, chosen)
-    refused = [index for index, gain in tries.said.items() if index not in kept and not gain.helps]
+    refused = [index for index, gain in tries.said.items() if index not in kept and not gain.accepted]
     for index in [*refused, *kept]:
         judged = helped(judged, effects[index], tries.said[index])
     # how probable each is was said before twins were fitted, and with what was refused in the model

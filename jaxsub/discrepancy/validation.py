@@ -13,8 +13,8 @@ from scipy import special
 from ..likelihood.whiteness import portmanteau
 from ..recording import Recording
 from ..vehicle import Layout
+from .cross_validation import LONG_BLOCKS
 from .diagnosis import Remainder
-from .show import LONG_BLOCKS
 
 CHANCE = 1e-3  # below it what remains is not random, or goes with an input
 _DELAYS = 60  # from one sample to a quarter of the longest run

@@ -5,12 +5,13 @@ import math
 from collections.abc import Sequence
 
 from ..effects import AbstractEffect
-from ..plain import finite_text
+from .cross_validation import LEVEL, Comparison, Gain
+from .decisions import Decision
 from .diagnosis import Verdict
 from .generic import Pattern
 from .name import Named, Naming
-from .show import Luck
-from .whiteness import Memory
+from .selector import SIGNIFICANCE
+from .whiteness import NOT_WHITE, Memory
 
 CERTAIN = 0.9
 # of a mismatch, the share that its cause explains
@@ -22,12 +23,13 @@ _BEYOND_DOUBT = 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Judged:
-    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader."""
+    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader, and every decision in order."""
 
     verdict: Verdict
     named: list[Named]
     p_value: float
     notes: list[str]
+    decisions: list[Decision] = dataclasses.field(default_factory=list)
 
 
 NOTHING = Judged("none", [], 1.0, [])
@@ -38,58 +40,97 @@ def both(earlier: Judged, later: Judged) -> Judged:
     named, notes = [*earlier.named, *later.named], [*earlier.notes, *later.notes]
     missed: Verdict = "unknown" if earlier.verdict == "unknown" else later.verdict
     verdict = _certainty(named) if named else missed
-    return Judged(verdict, named, min(earlier.p_value, later.p_value), notes)
+    decisions = [*earlier.decisions, *later.decisions]
+    return Judged(verdict, named, min(earlier.p_value, later.p_value), notes, decisions)
 
 
 def judge(naming: Naming, pattern: Pattern | None, memory: Memory) -> Judged:
-    """The verdict before anything was tried on the held-out runs."""
+    """The verdict before anything was fitted."""
     follows = pattern is not None and pattern.significant
     # a scan that no choice followed was either not significant or predicted nothing
     least = naming.first_p if naming.named or pattern is None or not follows else min(naming.first_p, pattern.p_value)
     p_value: float = min(1.0, 2.0 * least)
-    notes: list[str] = []
-    if pattern is not None and follows:
-        notes.append(f"{pattern.force.expression} is asked for in {pattern.force.equation}: {pattern.described}.")
-    if memory.correlated:
-        chance = f"that its samples are so correlated by chance has p = {memory.p_value:.2g}"
-        notes.append(f"What is left is not random: {chance}.")
-    if not naming.named and memory.correlated and not follows:
-        return Judged("unknown", [], min(p_value, memory.p_value), notes)
-    if not naming.named:
-        return Judged("unknown" if follows else "none", [], p_value, notes)
     labels = ", ".join(named.effect.label for named in naming.named)
-    if pattern is not None and follows and pattern.alone > naming.value + _CLEARLY:
-        notes.append(f"{labels} is the best of the vocabulary, and says less than a force without a name.")
-        return Judged("unknown", [], p_value, notes)
-    if pattern is not None and follows and pattern.explained < EXPLAINED:
-        notes.append(f"{labels} would explain {pattern.explained:.0%} of the mismatch, too little for its cause.")
-        return Judged("unknown", [], p_value, notes)
-    if memory.correlated and memory.explained < EXPLAINED:
-        notes.append(
-            f"{labels} would explain {memory.explained:.0%} of it and of what is left, too little for its cause."
-        )
-        return Judged("unknown", [], p_value, notes)
-    return Judged(_certainty(naming.named), naming.named, p_value, notes)
+    decisions, notes = _tests(labels, naming, pattern, memory), []
+    if pattern is not None and follows:
+        where = f"in {pattern.force.equation}: {pattern.described}"
+        notes.append(f"A nonparametric force {pattern.force.expression} is significant {where}.")
+    if memory.correlated:
+        notes.append(f"What is left is correlated in time (p = {memory.p_value:.2g} if it were white).")
+    if not naming.named:
+        p_value = min(p_value, memory.p_value) if memory.correlated and not follows else p_value
+        return Judged("unknown" if follows or memory.correlated else "none", [], p_value, notes, decisions)
+    doubts = _doubts(labels, naming, pattern if follows else None, memory)
+    decisions += [decision for decision, _ in doubts]
+    doubted = next((note for decision, note in doubts if decision.outcome == "rejected"), None)
+    if doubted is not None:
+        return Judged("unknown", [], p_value, [*notes, doubted], decisions)
+    return Judged(_certainty(naming.named), naming.named, p_value, notes, decisions)
 
 
-def helped(judged: Judged, effect: AbstractEffect, gain: Luck) -> Judged:
-    """The verdict once it is known what held-out runs gain by an effect."""
-    return dataclasses.replace(judged, notes=[*judged.notes, _gain_said(effect.label, gain)])
+def _tests(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory) -> list[Decision]:
+    """What was significant in a first look."""
+    choice = "proposed" if naming.named else "not proposed"
+    score = "p-value of the largest score, corrected for all candidates"
+    said = [Decision(labels or "mismatch", score, naming.first_p, SIGNIFICANCE, choice)]
+    if pattern is not None:
+        outcome = "significant" if pattern.significant else "not significant"
+        test = "p-value of a nonparametric force, corrected for all tried"
+        said.append(Decision(pattern.force.label, test, pattern.p_value, SIGNIFICANCE, outcome))
+    outcome = "correlated" if memory.correlated else "white"
+    return [*said, Decision("mismatch", "p-value of white innovations", memory.p_value, NOT_WHITE, outcome)]
 
 
-def _gain_said(label: str, gain: Luck) -> str:
-    if gain.helps and gain.freely:
-        left = finite_text(gain.free, ".0%")
-        start = f"With {label} free runs through the held-out runs leave {left} of their squared errors; "
-        return start + f"that this is luck has probability {gain.free_probability:.2g}."
-    if gain.helps and not math.isfinite(gain.likelihood):
-        return f"Without {label} the model diverges along the held-out runs."
-    if gain.helps:
-        start = f"With {label} the held-out runs gain {gain.likelihood:.4g} in log likelihood; "
-        return start + f"that this is luck has probability {gain.probability:.2g}."
-    worse = "the held-out runs worse"
-    why = worse if gain.sound else "with numbers that physics does not admit or the runs do not tell"
-    return f"{label} fitted the training runs better but {why}, and is not accepted."
+def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory) -> list[tuple[Decision, str]]:
+    """Whether names explain too little of the mismatch beside a significant `pattern` or correlated innovations."""
+    said = []
+
+    def tested(test: str, statistic: float, threshold: float, rejected: bool, note: str) -> None:
+        said.append((Decision(labels, test, statistic, threshold, "rejected" if rejected else "kept"), note))
+
+    if pattern is not None:
+        lead = pattern.alone - naming.value
+        note = f"{labels} has the highest evidence in the vocabulary, and less than a nonparametric force alone."
+        tested("log evidence of a nonparametric force over theirs", lead, _CLEARLY, lead > _CLEARLY, note)
+    shares = {"a nonparametric force": pattern.explained if pattern is not None else 1.0}
+    shares["correlated innovations"] = memory.explained if memory.correlated else 1.0
+    for beside, share in shares.items():
+        note = f"{labels} would explain {share:.0%} of the mismatch beside {beside}, too little for its cause."
+        tested(f"share explained beside {beside}", share, EXPLAINED, share < EXPLAINED, note)
+    return said
+
+
+def helped(judged: Judged, effect: AbstractEffect, gain: Comparison) -> Judged:
+    """The verdict once it is known what is gained by an effect."""
+    notes, decisions = [*judged.notes, _gain_said(effect.label, gain)], _decisions(effect.label, gain)
+    return dataclasses.replace(judged, notes=notes, decisions=[*judged.decisions, *decisions])
+
+
+def _decisions(label: str, gain: Comparison) -> list[Decision]:
+    """A record for each horizon of a comparison."""
+    outcome = "accepted" if gain.accepted else "rejected"
+    horizons = {"one step ahead": gain.one_step, "simulation": gain.simulation}
+    test = "p-value of the gain in cross-validated log predictive density"
+    said = [Decision(label, f"{test}, {name}", one.better, LEVEL, outcome) for name, one in horizons.items()]
+    if not gain.admissible:
+        said.append(Decision(label, "admissible and significant numbers", 0.0, 1.0, outcome))
+    return said
+
+
+def _gain_said(label: str, gain: Comparison) -> str:
+    if not gain.admissible:
+        return f"{label} is rejected: its fitted numbers are not physically admissible, or not significant."
+    said = " and ".join(
+        _horizon(*pair) for pair in (("one step ahead", gain.one_step), ("in simulation", gain.simulation))
+    )
+    return f"{label} is {'accepted' if gain.accepted else 'rejected'}: blocks of the training runs {said}."
+
+
+def _horizon(name: str, gain: Gain) -> str:
+    if not math.isfinite(gain.total):
+        return f"diverge {'without' if gain.total > 0.0 else 'with'} it {name}"
+    size = f"{abs(gain.total):.4g} in log predictive density"
+    return f"{'lose' if gain.total < 0.0 else 'gain'} {size} {name} (p = {gain.better:.2g})"
 
 
 def by_fit(judged: Judged, share: float) -> Judged:
@@ -101,22 +142,23 @@ def by_fit(judged: Judged, share: float) -> Judged:
 def standing_in(judged: Judged, effects: Sequence[AbstractEffect]) -> Judged:
     """The verdict with a word on effects that are in the model and were not named."""
     labels = ", ".join(effect.label for effect in effects)
-    note = f"Free runs through the held-out runs err less with {labels}, standing in for what has no name."
+    note = f"Simulation errors are smaller with {labels}, a surrogate for what has no name."
     return dataclasses.replace(judged, notes=[*judged.notes, note])
 
 
 def by_all(judged: Judged, pieces: int) -> Judged:
-    """The verdict on many effects found by what comes next, which free runs bear out, each run cut into `pieces`."""
-    note = "Free runs through the held-out runs, which alone asked for something else, err less with all of these."
+    """The verdict on many effects found one step ahead, which simulation accepts, each run cut into `pieces`."""
+    note = "These effects were found by innovations, and are accepted together by the simulation error."
     if pieces > 1:
-        note += f" The model does not run free for long: free runs are begun anew in each of {pieces} parts of a run."
+        note += f" The model cannot be simulated for long: simulation starts anew in each of {pieces} parts of a run."
     return dataclasses.replace(judged, notes=[*judged.notes, note])
 
 
-def idle(judged: Judged, label: str, others: Sequence[str]) -> Judged:
-    """The verdict less an effect that is not asked for any more beside `others`."""
+def idle(judged: Judged, label: str, others: Sequence[str], gain: Comparison) -> Judged:
+    """The verdict less an effect that is not accepted any more beside `others`."""
     named = [one for one in judged.named if one.effect.label != label]
-    note = f"Beside {', '.join(others)} the held-out runs ask for {label} no more, and it is left out."
+    judged = dataclasses.replace(judged, decisions=[*judged.decisions, *_decisions(label, gain)])
+    note = f"Beside {', '.join(others)} {label} is not accepted any more, and it is left out."
     return dataclasses.replace(judged, verdict=_certainty(named), named=named, notes=[*judged.notes, note])
 
 

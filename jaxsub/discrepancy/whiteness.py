@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from ..likelihood.whiteness import portmanteau, remembered
 
 # probability below which innovations are not white
-_NOT_WHITE = 1e-3
+NOT_WHITE = 1e-3
 
 
 class Memory(NamedTuple):
@@ -28,7 +28,7 @@ class Memory(NamedTuple):
     @property
     def correlated(self) -> bool:
         """Whether they are not."""
-        return self.p_value < _NOT_WHITE
+        return self.p_value < NOT_WHITE
 
 
 RANDOM = Memory(1.0, 1.0)

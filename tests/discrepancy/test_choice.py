@@ -14,11 +14,11 @@ from experiments.concealed_physics.plan import cases
 from experiments.next_manoeuvre.cases import case
 from jaxsub.cli.runs import load_runs
 from jaxsub.discrepancy import batch, diagnose
+from jaxsub.discrepancy.cross_validation import Comparison, Gain
 from jaxsub.discrepancy.explain import after_all
 from jaxsub.discrepancy.model import join, told
 from jaxsub.discrepancy.name import Named, refitted
 from jaxsub.discrepancy.selector import Selector
-from jaxsub.discrepancy.show import Luck
 from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, together
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
@@ -119,7 +119,7 @@ def test_a_limit_that_nothing_reaches_is_not_told(rate):
 
 
 class Fitted(Tries):
-    """A candidate 0 and its twins 1, 2 and 3: the evidence of their fits, and whom the held-out runs ask for.
+    """A candidate 0 and its twins 1, 2 and 3: the evidence of their fits, and which are accepted.
 
     2 has a sign that physics forbids, and 3 is not told.
     """
@@ -129,7 +129,7 @@ class Fitted(Tries):
         self.found = SimpleNamespace(selector=None)
 
     def model(self, numbers):
-        return None
+        return SimpleNamespace(predicted=None)
 
     def sound(self, numbers):
         return numbers[0] in (0, 1)
@@ -139,11 +139,11 @@ class Fitted(Tries):
         return more in self.asked
 
 
-def test_a_twin_that_the_held_out_runs_refuse_gives_way_to_the_next(monkeypatch):
+def test_a_twin_that_is_rejected_gives_way_to_the_next(monkeypatch):
     """Claim: the most probable that stands is taken, what was refused before is no rival, what is not told is one."""
     path = sys.modules["jaxsub.discrepancy.trial"]
     monkeypatch.setattr(path, "named_on", lambda *_: SimpleNamespace(twins=[1, 2, 3]))
-    monkeypatch.setattr(path, "by_all_runs", lambda models, evidence: evidence)
+    monkeypatch.setattr(path, "told_apart", lambda evidence, predicted: evidence)
     untold = [(3, 31.0), (2, -np.inf)]
     assert alone(Fitted(), [0]) == {}
     assert alone(Fitted(1), [0]) == {1: [(1, 20.0), *untold]}
@@ -177,8 +177,9 @@ class Sets(Tries):
     def closest(self, others, index):
         return [(index, 0.0)]
 
-    def gain(self, fewer, more):
-        return Luck(9.0, 0.001 if self.truth <= {*more} else 1.0, 0.5, 0.001, True, False)
+    def compared(self, fewer, more):
+        chance = 0.001 if self.truth <= {*more} else 1.0
+        return Comparison(Gain(9.0, chance, 1.0), Gain(9.0, chance, 1.0), 0.5, True)
 
     def helps(self, fewer, more):
         return more in self.truth

@@ -62,7 +62,7 @@ def run(effect, vocabulary=None):
     [pytest.param(CrossflowDrag("vertical", 5.0, 0.761, 0.3), marks=pytest.mark.long), SensorScale("q", 0.05)],
 )
 def test_names_locates_and_improves(effect, vocabulary):
-    """Claim: named where it acts, within four standard errors, with held-out runs at the noise."""
+    """Claim: named where it acts, within four standard errors, with the test run at the noise."""
     found, _ = run(effect, vocabulary)
     assert found.verdict == "named"
     (physics,) = found.physics
@@ -78,7 +78,7 @@ def test_names_locates_and_improves(effect, vocabulary):
     for channel, left in found.remains["improved"].items():
         assert min(left.random, left.independent) > 1e-3
         assert left.low < after[channel] < left.high
-    assert found.gain.left < 0.8 and found.gain.luck < 0.01
+    assert found.gain.ratio < 0.8 and found.gain.p_value < 0.01
     outcomes = {candidate.label: candidate.outcome for candidate in found.candidates}
     assert outcomes[physics.label] == "accepted"
     assert {outcomes[rival.label] for rival in physics.rivals if rival.label in outcomes} <= {"rival"}

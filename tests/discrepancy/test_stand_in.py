@@ -9,10 +9,10 @@ import pytest
 from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.cross_validation import Comparison, Gain
 from jaxsub.discrepancy.generic import Pattern
 from jaxsub.discrepancy.model import join
 from jaxsub.discrepancy.selector import Selector
-from jaxsub.discrepancy.show import Luck
 from jaxsub.discrepancy.stand_in import described, freest
 from jaxsub.discrepancy.trial import Found, Model, Trial
 from jaxsub.discrepancy.verdict import Judged
@@ -23,6 +23,8 @@ from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import fit
+
+NO_GAIN = Gain(0.0, 1.0, 1.0)
 
 
 class Freely(Selector):
@@ -91,7 +93,7 @@ def test_a_description_joins_where_it_explains_some_of_what_is_left(
     again = Freely([], [()], lambda *_: True)
     fakes = {
         "sound": lambda fit, effects: effects[0] is not yaw,
-        "luck": lambda *given, freely: Luck(-1.0, 1.0, free, chance, given[2], freely),
+        "compare": lambda before, after: Comparison(NO_GAIN, Gain(1.0, chance, 1.0 - chance), free, True),
         "listed": lambda *_: again,
         "weighed": lambda *_: seen(again, RANDOM),
     }
@@ -129,14 +131,14 @@ def test_a_force_that_overdoes_it_is_tried_by_halves(monkeypatch, most, worse, a
 
     def fitted(trial, model, effects, disturbance):
         spreads.append(effects[0].spread)
-        return model._replace(shown=effects[0].spread, added=tuple(effects))
+        return model._replace(predicted=effects[0].spread, added=tuple(effects))
 
-    def gained(before, after, sound, *, freely):
-        return Luck(1.0, 0.01 if after < most else 1.0, 1.0 + worse / after, 1.0, sound, freely)
+    def gained(before, after, admissible):
+        return Comparison(Gain(1.0, 0.01 if after < most else 1.0, 0.5), NO_GAIN, 1.0 + worse / after, admissible)
 
     monkeypatch.setattr(Trial, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
-    monkeypatch.setattr(path, "luck", gained)
+    monkeypatch.setattr(path, "compare", gained)
     trial = object.__new__(Trial)
     left = seen(Freely([], [()], lambda *_: True), Memory(1e-9, 1.0), pattern, named.view.disturbance)
     best, said = described(trial, named, left, Judged("unknown", [], 1e-9, []), None)
@@ -164,7 +166,7 @@ def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, er
     monkeypatch.setattr(Trial, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
     monkeypatch.setattr(path, "allowing_for", lambda view, fit: fit)
-    monkeypatch.setattr(path, "luck", lambda *given, freely: Luck(1.0, 0.01, 0.5, 0.01, given[2], freely))
+    monkeypatch.setattr(path, "compare", lambda *given: Comparison(Gain(1.0, 0.01, 0.99), NO_GAIN, 0.5, True))
     monkeypatch.setattr(path, "listed", lambda *_: Freely([], [()], lambda *_: True))
     monkeypatch.setattr(path, "weighed", lambda *_: seen(None, RANDOM))
     selector = Freely([drag], [(0.3,), (0.0,)], lambda *_: True, named.view.disturbance)

@@ -1,0 +1,192 @@
+r"""How well a model predicts each block of the training runs from the other blocks, and whether another does better.
+
+Accepting an effect needs no run outside the training runs. With $H = \sum_b H_b$ the products of a model's residual and
+of its derivatives J by the free numbers over blocks b of the runs, a block is predicted at two horizons:
+
+- one step ahead, $\ln p(y_b | y_{-b}) = \ln Z(H) - \ln Z(H - H_b) - \ln|L_b|$ from whitened innovations, with
+  $\ln Z = -\tfrac12(r^Tr - b^TA^{-1}b + \ln|A|)$ the integral over all free numbers and $L_b$ the innovations' factors;
+- the whole run, $-\tfrac12\|e_b - J_b\hat\delta_{-b}\|^2$ from simulation errors over σ, with $\hat\delta_{-b}$ the
+  least-squares change of the free numbers without the block. A run's initial state is fitted to all of the run.
+
+The differences of two models over n blocks have Student's t with n - 1 degrees of freedom where neither is better.
+Sources: Stone (1974), J. R. Stat. Soc. B 36 (cross-validation); Künsch (1989), Ann. Statist. 17 (blocks of what is
+correlated).
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+from scipy import special
+
+from ..estimate import Fit, Problem
+from ..likelihood import Columns, Disturbance, System, part_products
+from .evidence import integrated
+from .view import View
+
+# level at which one model is called better or worse than another
+LEVEL = 0.05
+# blocks of each run one step ahead, and of simulation errors, which are correlated for longer
+_SHORT_BLOCKS, LONG_BLOCKS = 24, 4
+_TINY = 1e-300
+# columns of a program are a multiple of this many
+_WIDTH = 8
+
+
+class Predicted(NamedTuple):
+    """Log predictive densities of blocks of the training runs, each given the others, up to a common constant.
+
+    **Fields**
+
+    - `one_step`: (m,) of innovations. `simulation`: (l,) of simulation errors. Minus infinity where a model diverges.
+    """
+
+    one_step: Float[np.ndarray, " m"]
+    simulation: Float[np.ndarray, " l"]
+
+
+class Gain(NamedTuple):
+    """By how much one model's log predictive density exceeds another's in total, and two one-sided p-values.
+
+    `better` is how probable so large a gain is where neither model predicts better, `worse` so large a loss.
+    """
+
+    total: float
+    better: float
+    worse: float
+
+
+class Comparison(NamedTuple):
+    """Whether a model with more in it predicts the training runs better, by horizon.
+
+    **Fields**
+
+    - `one_step`, `simulation`: the gain at each horizon. `ratio`: of squared simulation errors, after to before.
+    - `admissible`: whether physics admits the numbers of the fit and each is significant.
+    """
+
+    one_step: Gain
+    simulation: Gain
+    ratio: float
+    admissible: bool
+
+    @property
+    def accepted(self) -> bool:
+        """Whether it is better at one horizon and worse at none, with admissible numbers."""
+        horizons = (self.one_step, self.simulation)
+        better, worse = (min(getattr(gain, side) for gain in horizons) for side in ("better", "worse"))
+        return self.admissible and better < LEVEL and not worse < LEVEL
+
+
+def compare(before: Predicted, after: Predicted, admissible: bool = True) -> Comparison:
+    """What a model `after` gains over one `before` that has less in it."""
+    squares = lambda one: -2.0 * float(np.sum(one.simulation))
+    ratio = squares(after) / max(squares(before), _TINY) if np.isfinite(squares(before)) else 0.0
+    one_step, simulation = (gain(b, a) for b, a in zip(before, after, strict=True))
+    return Comparison(one_step, simulation, ratio, admissible)
+
+
+def gain(before: Float[np.ndarray, " n"], after: Float[np.ndarray, " n"]) -> Gain:
+    """The total of block-wise differences, and how probable it is where their mean is zero, by Student's t.
+
+    A block that no number describes in one model alone decides; one that is none in both says nothing.
+    """
+    lost, found = (np.any(~np.isfinite(one)) for one in (after, before))
+    if lost or found:
+        sign = float(found) - float(lost)
+        return Gain(sign * np.inf if sign else 0.0, 0.0 if sign > 0.0 else 1.0, 0.0 if sign < 0.0 else 1.0)
+    difference = after - before
+    n = len(difference)
+    total = float(np.sum(difference))
+    if n < 2 or total == 0.0:
+        return Gain(total, 1.0, 1.0)
+    t = total / max(float(np.std(difference, ddof=1)) * np.sqrt(n), _TINY)
+    return Gain(total, float(special.stdtr(n - 1, -t)), float(special.stdtr(n - 1, t)))
+
+
+def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
+    """`Predicted.one_step` of a view's vehicle under the view's disturbance."""
+    known = len(view.prior)
+    # few shapes, and so few programs: empty columns are taken out again
+    padded = jax.tree.map(lambda M: jnp.pad(M, [(0, 0)] * 3 + [(0, -known % _WIDTH)]), view.base)
+    found = _block_products(view.disturbance, view.followed.system, padded)
+    products, logarithms = (np.asarray(part).reshape(-1, *part.shape[2:]) for part in found)
+    products = products[:, :known, :known]
+    # what lies beyond the end of a short run has nothing
+    there = (logarithms != 0.0) | np.any(products != 0.0, axis=(1, 2))
+    products, logarithms = products[there], logarithms[there]
+    gram = products.sum(axis=0) + np.asarray(view.prior)
+    if not np.all(np.isfinite(gram)):
+        return np.full(len(products), -np.inf)
+    whole = integrated(gram)
+    return np.array([whole - integrated(gram - part) for part in products]) - logarithms
+
+
+@eqx.filter_jit
+def _block_products(
+    disturbance: Disturbance, system: System, columns: Columns
+) -> tuple[Float[Array, "r m q q"], Float[Array, "r m"]]:
+    """Products of the whitened columns in each block of every run, and half the log-determinant there."""
+    return part_products(disturbance, system, columns, _SHORT_BLOCKS)
+
+
+def simulated(fit: Fit, blocks: int = LONG_BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
+    """`Predicted.simulation` of a fit, in so many `blocks` a run; the initial states may be `known_start`."""
+    products = _simulation_products(fit, blocks)
+    if not np.all(np.isfinite(products)):
+        return np.full(products.shape[0] * products.shape[1], -np.inf)
+    problem, free = fit.problem, len(fit.names)
+    prior = np.diag(np.asarray(problem.prior_std, float) ** -2.0)
+    spread = np.zeros_like(problem.spread) if known_start else np.asarray(problem.spread)
+    own = slice(1 + free, None)
+    scale = np.concatenate([np.ones(1 + free), spread])
+    products = products * scale[:, None] * scale
+    # each run's initial state is optimal, and follows the other numbers by Y
+    whole = products.sum(axis=1)
+    Y = np.linalg.solve(whole[:, own, own] + np.eye(len(spread)), whole[:, own, : 1 + free])
+    Y[..., 0] = 0.0
+    follow = np.concatenate([np.broadcast_to(np.eye(1 + free), (len(Y), 1 + free, 1 + free)), -Y], axis=1)
+    reduced = np.einsum("rqa,rbqs,rsc->rbac", follow, products, follow).reshape(-1, 1 + free, 1 + free)
+    penalty = np.sum(np.swapaxes(Y, 1, 2) @ Y, axis=0)
+    values = _prior_pull(problem)
+    total = reduced.sum(axis=0) + penalty
+    total[1:, 1:] += prior
+    total[0, 1:] += values
+    total[1:, 0] += values
+    return np.array([-0.5 * _left(total - block, block) for block in reduced])
+
+
+def _prior_pull(problem: Problem) -> Float[np.ndarray, " p"]:
+    """(p,) products of the free numbers' priors with how far the numbers are below the priors' means."""
+    values = problem.vehicle.values()
+    at = np.array([float(values[row.name]) for row in problem.vehicle.layout.free])
+    return (np.asarray(problem.prior_mean) - at) * np.asarray(problem.prior_std, float) ** -2.0
+
+
+def _left(others: Float[np.ndarray, "q q"], block: Float[np.ndarray, "q q"]) -> float:
+    """The squares that a block has at the numbers of the `others`."""
+    size = np.sqrt(np.maximum(np.diag(others)[1:], _TINY))
+    unit = others[1:, 1:] / np.outer(size, size)
+    step = np.linalg.lstsq(unit, others[1:, 0] / size, rcond=1e-12)[0] / size
+    at = np.concatenate([[1.0], -step])
+    return float(at @ block @ at)
+
+
+def _simulation_products(fit: Fit, blocks: int) -> Float[np.ndarray, "r b q q"]:
+    """Products by block of simulation errors over σ and their derivatives by free numbers and the initial state."""
+    runs, model = fit.runs, fit.model
+    weight = (np.asarray(runs.mask) / np.asarray(fit.sigma))[..., None]
+    parts = (model.error[..., None], model.theta, model.start)
+    samples = 1 + np.asarray(runs.live).sum(axis=1)
+    # a model that diverges has no numbers, which is for the caller to see
+    with np.errstate(invalid="ignore", over="ignore"):
+        columns = np.concatenate([np.asarray(part) for part in parts], axis=-1) * weight
+        return np.stack([_by_block(run[:count], blocks) for run, count in zip(columns, samples, strict=True)])
+
+
+def _by_block(columns: Float[np.ndarray, "k c q"], blocks: int) -> Float[np.ndarray, "b q q"]:
+    flat = [part.reshape(-1, part.shape[-1]) for part in np.array_split(columns, blocks)]
+    return np.stack([part.T @ part for part in flat])

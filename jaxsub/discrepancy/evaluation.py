@@ -1,0 +1,101 @@
+"""Models simulated along the test runs, once, after the last decision."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..estimate import channel_rms, initial_guess, predict, search
+from ..likelihood import follow, residual_outputs
+from ..recording import Recording
+from ..recording.runs import Runs
+from ..vehicle import AbstractVehicle
+from .batch import batch
+from .cross_validation import LONG_BLOCKS, gain
+from .diagnosis import Gain, Overlay
+from .restarts import restarted
+from .trial import Model
+
+
+@dataclasses.dataclass(frozen=True)
+class Evaluation:
+    """A model's simulation of the test runs, of which only the initial states were estimated.
+
+    **Fields**
+
+    - `predicted`, `error`: lists of (K, c) arrays in SI, a run each. `rms`: rms(error)/σ by channel.
+    - `squares`: (K,) the squared errors/σ of each sample, a run each; infinite where the model diverges.
+    """
+
+    predicted: list[np.ndarray]
+    error: list[np.ndarray]
+    rms: dict[str, float]
+    squares: list[np.ndarray]
+
+
+def evaluated(
+    vehicle: AbstractVehicle,
+    train: Sequence[Recording],
+    test: Sequence[Recording],
+    models: Sequence[Model],
+    pieces: int,
+) -> list[Evaluation]:
+    """Each of `models` simulated along the runs `test`, in several `pieces` from a filter's state at each of them.
+
+    The batches are as large and as long as that of the runs `train`, so that no other programs are needed.
+    """
+    runs, size = batch(vehicle, [*train, *test]), len(train)
+    found = []
+    for model in models:
+        finer = dataclasses.replace(runs, substeps=max(runs.substeps, model.view.runs.substeps))
+        predicted, errors = [], []
+        for first in range(size, size + len(test), size):
+            chosen = range(first, min(first + size, size + len(test)))
+            taken = finer.take(chosen, size)
+            shown = _simulated(model, taken, pieces)
+            predicted += list(np.asarray(shown)[: len(chosen)])
+            errors += list(np.asarray(residual_outputs(model.fit.vehicle, taken, shown))[: len(chosen)])
+        whole = finer.take(range(size, size + len(test)), len(test))
+        white = np.stack(errors) / np.asarray(model.fit.sigma)
+        rms = channel_rms(jnp.asarray(white), whole, vehicle.layout.channels)
+        squares = np.sum(white**2, axis=-1)
+        found.append(Evaluation(predicted, errors, rms, list(np.where(np.isnan(squares), np.inf, squares))))
+    return found
+
+
+def _simulated(model: Model, runs: Runs, pieces: int) -> Float[Array, "r k c"]:
+    """What a model shows along `runs`, from initial states that are fitted, or in pieces from filtered states."""
+    vehicle, sigma = model.fit.vehicle, model.fit.sigma
+    if pieces == 1:
+        return predict(vehicle, runs, search(vehicle, runs, sigma=sigma, moving=False).start)
+    followed = follow(vehicle, runs, sigma, model.view.disturbance, *initial_guess(vehicle, runs))
+    return restarted(vehicle, followed, runs, pieces)
+
+
+def test_gain(before: Evaluation, after: Evaluation, pieces: int) -> Gain:
+    """The ratio of squared simulation errors on the test runs, and how probable so large a fall is by chance.
+
+    By Student's t over blocks of every run, no shorter than the pieces of a simulation.
+    """
+    blocks = lambda one: np.concatenate([_sums(run, max(LONG_BLOCKS, pieces)) for run in one.squares])
+    total = lambda one: float(sum(run.sum() for run in one.squares))
+    return Gain(total(after) / max(total(before), 1e-300), gain(-blocks(before), -blocks(after)).better)
+
+
+def _sums(samples: Float[np.ndarray, " k"], blocks: int) -> Float[np.ndarray, " b"]:
+    return np.array([part.sum() for part in np.array_split(samples, blocks)])
+
+
+def overlays(
+    recordings: Sequence[Recording], channels: tuple[str, ...], baseline: Evaluation, improved: Evaluation
+) -> list[Overlay]:
+    """Measured and simulated outputs of the test runs."""
+    drawn = []
+    for recording, before, after in zip(recordings, baseline.predicted, improved.predicted, strict=True):
+        k = len(recording.times)
+        named = lambda table, k=k: {c: table[:k, i] for i, c in enumerate(channels)}
+        measured = {c: recording.column(c) for c in channels}
+        drawn.append(Overlay(recording.name, recording.times, measured, named(before), named(after)))
+    return drawn

@@ -1,0 +1,128 @@
+"""Models are compared by how well they predict blocks of the training runs from the other blocks."""
+
+import dataclasses
+from functools import cache
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from rigs import driven, oscillator
+from scipy import stats
+
+from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.cross_validation import Comparison, Gain, Predicted, compare, gain, one_step_ahead, simulated
+from jaxsub.discrepancy.verdict import NOTHING, helped
+from jaxsub.discrepancy.view import look
+from jaxsub.effects.hull_damping import CubicDamping
+from jaxsub.estimate import fit
+from jaxsub.likelihood import linearise, whitened
+from jaxsub.simulate import synthetic
+
+
+@cache
+def fitted():
+    """An oscillator fitted to two of its own runs, the second shorter."""
+    truth = oscillator()
+    inputs = [driven(truth, 0.1 * np.arange(count), seed, amplitude=1.0) for seed, count in ((0, 240), (1, 180))]
+    runs = batch(truth, synthetic(truth, inputs, seed=3))
+    return fit(truth, runs)
+
+
+@pytest.mark.parametrize("blocks", [4, 8, 48])
+def test_p_values_are_uniform_where_neither_model_is_better(blocks):
+    """Claim: of 4000 comparisons without a difference p < 0.05 in 5 %, p < 0.001 in 0.1 %, and p is uniform."""
+    rng = np.random.default_rng(blocks)
+    found = [gain(np.zeros(blocks), rng.standard_normal(blocks)) for _ in range(4000)]
+    better = np.array([one.better for one in found])
+    assert np.mean(better < 0.05) == pytest.approx(0.05, abs=0.012)
+    assert np.mean(better < 0.001) < 0.003
+    assert stats.kstest(better, "uniform").pvalue > 0.001
+    np.testing.assert_allclose(better + [one.worse for one in found], 1.0)
+
+
+def test_the_p_value_is_that_of_scipys_t_test():
+    """Claim: it is SciPy's one-sided paired t-test of the blocks."""
+    rng = np.random.default_rng(5)
+    before, after = rng.standard_normal((2, 20))
+    reference = stats.ttest_rel(after, before, alternative="greater").pvalue
+    assert gain(before, after).better == pytest.approx(reference, rel=1e-9)
+
+
+def test_a_model_that_diverges_gains_nothing_and_one_that_does_no_more_gains():
+    """Claim: where the model with more diverges it is rejected, where only the one with less does it is accepted."""
+    fine, lost = Predicted(np.zeros(24), np.zeros(8)), Predicted(np.full(24, -np.inf), np.full(8, -np.inf))
+    assert not compare(fine, lost).accepted
+    assert not compare(lost, lost).accepted
+    assert compare(lost, fine).accepted
+    assert not compare(lost, fine, admissible=False).accepted
+    said = helped(NOTHING, CubicDamping("x", -1.0), compare(lost, fine))
+    assert "diverge without it" in said.notes[0] and [one.outcome for one in said.decisions] == ["accepted"] * 2
+
+
+@pytest.mark.parametrize(
+    ("one_step", "simulation", "accepted"),
+    [((1e-3, 0.9), (0.5, 0.5), True), ((0.5, 0.5), (1e-3, 0.9), True), ((0.5, 0.5), (0.5, 0.5), False),
+     ((1e-3, 0.9), (0.99, 1e-3), False), ((0.99, 1e-3), (1e-3, 0.9), False)],
+)  # fmt: skip
+def test_accepted_is_what_is_better_at_one_horizon_and_worse_at_none(one_step, simulation, accepted):
+    """Claim: a gain at one horizon is enough, and a loss at the other takes it back."""
+    found = Comparison(Gain(1.0, *one_step), Gain(1.0, *simulation), 1.0, True)
+    assert found.accepted is accepted
+
+
+def test_a_block_one_step_ahead_has_its_gaussian_conditional_density():
+    """Claim: it is the density of its whitened innovations given those of the other blocks, by dense covariances."""
+    view = look(fitted())
+    found = one_step_ahead(view)
+    white, factor = whitened(view.disturbance, view.followed.system, view.base)
+    white, factor = np.asarray(white), np.asarray(factor)
+    free, logs = white.shape[-1] - 1, np.log(np.diagonal(factor, axis1=-2, axis2=-1))
+    # 240 and 180 samples in blocks of ten
+    places = [(run, slice(k, k + 10)) for run, count in ((0, 240), (1, 180)) for k in range(0, count, 10)]
+    pieces, spread = [white[place] for place in places], [logs[place].sum() for place in places]
+    assert len(found) == len(places)
+    r = [piece[..., 0].ravel() for piece in pieces]
+    J = [piece[..., 1:].reshape(-1, free) for piece in pieces]
+    prior = np.asarray(view.prior)
+    expected = []
+    for b in range(0, len(pieces), 5):
+        rest = [i for i in range(len(pieces)) if i != b]
+        A = sum(J[i].T @ J[i] for i in rest) + prior[1:, 1:]
+        mean = np.linalg.solve(A, sum(J[i].T @ r[i] for i in rest) + prior[1:, 0])
+        covariance = np.eye(len(r[b])) + J[b] @ np.linalg.solve(A, J[b].T)
+        density = stats.multivariate_normal(J[b] @ mean, covariance).logpdf(r[b])
+        expected.append(density + 0.5 * len(r[b]) * np.log(2.0 * np.pi) - spread[b])
+    np.testing.assert_allclose(found[::5], expected, rtol=1e-6, atol=1e-6)
+
+
+def test_a_block_of_a_simulation_has_the_errors_of_a_fit_to_the_others():
+    """Claim: it equals the squared errors after least squares on the other blocks, the initial states following."""
+    whole = fitted()
+    found = simulated(whole, 4)
+    model, weight = whole.model, np.asarray(whole.runs.mask) / np.asarray(whole.sigma)
+    spread = np.asarray(whole.problem.spread)
+    error, theta, start = (np.asarray(part) for part in (model.error, model.theta, model.start))
+    theta, start = theta * weight[..., None], start * weight[..., None] * spread
+    error, samples = error * weight, 1 + np.asarray(whole.runs.live).sum(1)
+    reduced = []
+    for run in range(2):
+        X, J = start[run].reshape(-1, start.shape[-1]), theta[run].reshape(-1, theta.shape[-1])
+        reduced.append(theta[run] - start[run] @ np.linalg.solve(X.T @ X + np.eye(X.shape[1]), X.T @ J))
+    blocks = [(run, part) for run in range(2) for part in np.array_split(np.arange(samples[run]), 4)]
+    flat = lambda values, chosen: np.concatenate(
+        [values[r][part].reshape(-1, *values[r].shape[2:]) for r, part in chosen]
+    )
+    for number, block in enumerate(blocks):
+        rest = [other for other in blocks if other is not block]
+        step = np.linalg.lstsq(flat(reduced, rest), flat(error, rest))[0]
+        left = np.sum((flat(error, [block]) - flat(reduced, [block]) @ step) ** 2)
+        assert found[number] == pytest.approx(-0.5 * left, rel=1e-3)
+
+
+def test_a_vehicle_that_runs_away_is_predicted_nowhere():
+    """Claim: a model that diverges along the training runs has no density in any block, and no NaN."""
+    whole = fitted()
+    away = whole.vehicle.with_values({"D_x": jnp.asarray(-1e3)})
+    model = linearise(away, whole.runs, whole.start)
+    assert not bool(jnp.all(jnp.isfinite(model.error)))
+    assert np.all(np.isneginf(simulated(dataclasses.replace(whole, vehicle=away, model=model))))
