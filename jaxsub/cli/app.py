@@ -78,7 +78,7 @@ def identify(
 @_vehicle
 @_runs
 @_out()
-@click.option("--hold-out", type=_PATH, multiple=True, help="A run to judge by and not to fit; repeatable.")
+@click.option("--hold-out", type=_PATH, multiple=True, help="A test run, read once after every decision; repeatable.")
 @_columns
 @_overwrite
 @common
@@ -100,9 +100,10 @@ def check(
 @_vehicle
 @_runs
 @_out(required=True)
-@click.option("--hold-out", type=_PATH, multiple=True, help="A run to judge by and not to fit; repeatable.")
+@click.option("--hold-out", type=_PATH, multiple=True, help="A test run, read once after every decision; repeatable.")
 @click.option("--effects", type=_PATH, help="A Python script with effects of your own, to be tried too.")
 @click.option("--manoeuvre/--no-manoeuvre", default=True, help="Where rivals remain, look for the run that settles it.")
+@click.option("--explain", is_flag=True, help="Print every decision: its test, statistic, threshold and outcome.")
 @_columns
 @_overwrite
 @common
@@ -113,13 +114,14 @@ def diagnose(
     hold_out: tuple[Path, ...],
     effects: Path | None,
     manoeuvre: bool,
+    explain: bool,
     columns: Path | None,
     overwrite: bool,
 ) -> None:
-    """Fit, locate the mismatch, name the missing physics, model it, and show it on held-out runs."""
+    """Fit, locate the mismatch, name the missing physics, model it, and show it on test runs."""
     from . import diagnose as command
 
-    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns)
+    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns, explain)
 
 
 @app.command()

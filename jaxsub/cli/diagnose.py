@@ -9,6 +9,7 @@ from rich.text import Text
 
 from ..discrepancy import Diagnosis
 from ..discrepancy import diagnose as diagnose_runs
+from ..discrepancy.decisions import decision_rows
 from ..discrepancy.next_run import next_run, said
 from ..effects import AbstractEffect, from_script, vocabulary
 from ..estimate import require_free
@@ -33,11 +34,12 @@ def run(
     script: Path | None = None,
     manoeuvre: bool = True,
     columns: Path | None = None,
+    explain: bool = False,
 ) -> None:
-    """Diagnose the recordings at `runs`, judged on those at `held` or on what `hold_out` sets aside.
+    """Diagnose the recordings at `runs`, shown on the test runs at `held` or on what `hold_out` sets aside.
 
     Effects that the Python file at `script` defines are tried with those that are installed. Of logs the file at
-    `columns` says what to take.
+    `columns` says what to take. `explain` prints every decision.
     """
     session.start()
     with fresh_folder(out, overwrite, paths_of(vehicle_path, *runs, *held, script, columns)) as folder:
@@ -45,10 +47,10 @@ def run(
         vehicle = read_vehicle(vehicle_path, own)
         require_free(vehicle, str(vehicle_path))
         recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
-        train, judged = (recordings, unseen) if held else hold_out(recordings)
-        answer = diagnosed(vehicle, train, judged, (*vocabulary(), *own), manoeuvre)
+        train, test = (recordings, unseen) if held else hold_out(recordings)
+        answer = diagnosed(vehicle, train, test, (*vocabulary(), *own), manoeuvre)
         # shown before it is written: where writing fails, minutes of work are not lost
-        answer.emit()
+        answer.emit(explain)
         answer.write(folder)
     terminal.note(f"report: {out / 'report.html'}")
 
@@ -61,9 +63,9 @@ class Answer:
     improved: AbstractVehicle
     next_run: Recording | None
 
-    def emit(self) -> None:
+    def emit(self, explain: bool = False) -> None:
         """Print the verdict, or with `--json` what `diagnosis.json` holds, on standard output."""
-        terminal.emit(self.diagnosis.to_json(), lambda: show(self.diagnosis))
+        terminal.emit(self.diagnosis.to_json(), lambda: show(self.diagnosis, explain))
 
     def write(self, folder: Path) -> None:
         """Write `diagnosis.json`, `improved.toml`, `report.html`, `figures/` and `next_manoeuvre.csv` into `folder`."""
@@ -79,16 +81,16 @@ class Answer:
 def diagnosed(
     vehicle: AbstractVehicle,
     train: Sequence[Recording],
-    held: Sequence[Recording],
+    test: Sequence[Recording],
     kinds: tuple[type[AbstractEffect], ...] | None = None,
     manoeuvre: bool = True,
 ) -> Answer:
-    """Diagnose `vehicle` by the runs `train`, judged on `held`, trying effects of `kinds`: all installed where None.
+    """Diagnose `vehicle` by the runs `train`, shown on `test`, trying effects of `kinds`: all installed where None.
 
     Where rivals remain and a `manoeuvre` is wanted, inputs that would tell them apart are looked for.
     """
     with terminal.progress(f"diagnosing {vehicle.layout.name}") as told:
-        diagnosis, improved = diagnose_runs(vehicle, train, held, vocabulary=kinds, progress=told)
+        diagnosis, improved = diagnose_runs(vehicle, train, test, vocabulary=kinds, progress=told)
         if not (manoeuvre and diagnosis.explanations):
             return Answer(diagnosis, improved, None)
         told("looking for the manoeuvre that would settle it")
@@ -99,8 +101,11 @@ def diagnosed(
         return Answer(dataclasses.replace(diagnosis, next_manoeuvre=advice), improved, found.recording)
 
 
-def show(diagnosis: Diagnosis) -> None:
-    """The verdict, the effects that were named, and the errors on the test runs, on standard output."""
+def show(diagnosis: Diagnosis, explain: bool = False) -> None:
+    """The verdict, the effects that were named, and the errors on the test runs, on standard output.
+
+    `explain` adds a row for every decision, in order.
+    """
     terminal.results.print(Panel(Text(diagnosis.summary), title=diagnosis.verdict, expand=False))
     parameters = [
         (found.label, symbol, measurement(one.value, one.standard_error), unit(one.unit), percent(found.probability))
@@ -116,3 +121,5 @@ def show(diagnosis: Diagnosis) -> None:
     elif before:
         rows = [(name, ratio(value)) for name, value in before.items()]
         terminal.table(("test run: channel", "rms/σ"), rows)
+    if explain:
+        terminal.table(("candidate", "test", "statistic", "threshold", "outcome"), decision_rows(diagnosis.decisions))

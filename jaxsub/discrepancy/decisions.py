@@ -25,6 +25,6 @@ class Decision:
         return said | {"statistic": self.statistic if math.isfinite(self.statistic) else None}
 
 
-def rows(decisions: Sequence[Decision]) -> list[tuple[str, str, str, str, str]]:
+def decision_rows(decisions: Sequence[Decision]) -> list[tuple[str, str, str, str, str]]:
     """The same as a table's rows of text."""
     return [(d.candidate, d.test, f"{d.statistic:.4g}", f"{d.threshold:.4g}", d.outcome) for d in decisions]

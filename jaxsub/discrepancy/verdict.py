@@ -92,8 +92,8 @@ def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory
         lead = pattern.alone - naming.value
         note = f"{labels} has the highest evidence in the vocabulary, and less than a nonparametric force alone."
         tested("log evidence of a nonparametric force over theirs", lead, _CLEARLY, lead > _CLEARLY, note)
-    shares = {"a nonparametric force": pattern.explained if pattern is not None else 1.0}
-    shares["correlated innovations"] = memory.explained if memory.correlated else 1.0
+    shares = {"a nonparametric force": pattern.explained} if pattern is not None else {}
+    shares |= {"correlated innovations": memory.explained} if memory.correlated else {}
     for beside, share in shares.items():
         note = f"{labels} would explain {share:.0%} of the mismatch beside {beside}, too little for its cause."
         tested(f"share explained beside {beside}", share, EXPLAINED, share < EXPLAINED, note)

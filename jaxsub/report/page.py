@@ -7,6 +7,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from ..discrepancy.decisions import decision_rows
 from ..discrepancy.diagnosis import Diagnosis
 from . import tables, text
 from .bars import top_candidates
@@ -60,6 +61,7 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
         "check_rows": tables.check_rows(diagnosis),
         "findings": tables.finding_rows(diagnosis.findings),
         "channel_rows": tables.channel_rows(diagnosis),
+        "decision_rows": decision_rows(diagnosis.decisions),
     }
     return _environment().get_template("template.html.j2").render(context)
 
