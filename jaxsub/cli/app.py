@@ -103,6 +103,7 @@ def check(
 @click.option("--hold-out", type=_PATH, multiple=True, help="A test run, read once after every decision; repeatable.")
 @click.option("--effects", type=_PATH, help="A Python script with effects of your own, to be tried too.")
 @click.option("--manoeuvre/--no-manoeuvre", default=True, help="Where rivals remain, look for the run that settles it.")
+@click.option("--budget", metavar="SECONDS", type=click.FloatRange(0.0), help="End with the answer so far after these.")
 @click.option("--explain", is_flag=True, help="Print every decision: its test, statistic, threshold and outcome.")
 @_columns
 @_overwrite
@@ -114,6 +115,7 @@ def diagnose(
     hold_out: tuple[Path, ...],
     effects: Path | None,
     manoeuvre: bool,
+    budget: float | None,
     explain: bool,
     columns: Path | None,
     overwrite: bool,
@@ -121,7 +123,7 @@ def diagnose(
     """Fit, locate the mismatch, name the missing physics, model it, and show it on test runs."""
     from . import diagnose as command
 
-    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns, explain)
+    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns, explain, budget)
 
 
 @app.command()

@@ -35,11 +35,13 @@ def run(
     manoeuvre: bool = True,
     columns: Path | None = None,
     explain: bool = False,
+    budget: float | None = None,
 ) -> None:
     """Diagnose the recordings at `runs`, shown on the test runs at `held` or on what `hold_out` sets aside.
 
     Effects that the Python file at `script` defines are tried with those that are installed. Of logs the file at
-    `columns` says what to take. `explain` prints every decision.
+    `columns` says what to take. `explain` prints every decision. After `budget` seconds the answer so
+    far is given.
     """
     session.start()
     with fresh_folder(out, overwrite, paths_of(vehicle_path, *runs, *held, script, columns)) as folder:
@@ -48,7 +50,7 @@ def run(
         require_free(vehicle, str(vehicle_path))
         recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
         train, test = (recordings, unseen) if held else hold_out(recordings)
-        answer = diagnosed(vehicle, train, test, (*vocabulary(), *own), manoeuvre)
+        answer = diagnosed(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget)
         # shown before it is written: where writing fails, minutes of work are not lost
         answer.emit(explain)
         answer.write(folder)
@@ -84,14 +86,16 @@ def diagnosed(
     test: Sequence[Recording],
     kinds: tuple[type[AbstractEffect], ...] | None = None,
     manoeuvre: bool = True,
+    budget: float | None = None,
 ) -> Answer:
     """Diagnose `vehicle` by the runs `train`, shown on `test`, trying effects of `kinds`: all installed where None.
 
-    Where rivals remain and a `manoeuvre` is wanted, inputs that would tell them apart are looked for.
+    Where rivals remain and a `manoeuvre` is wanted, inputs that would tell them apart are looked for. After `budget`
+    seconds no further effect is tried.
     """
     with terminal.progress(f"diagnosing {vehicle.layout.name}") as told:
-        diagnosis, improved = diagnose_runs(vehicle, train, test, vocabulary=kinds, progress=told)
-        if not (manoeuvre and diagnosis.explanations):
+        diagnosis, improved = diagnose_runs(vehicle, train, test, vocabulary=kinds, progress=told, budget=budget)
+        if not (manoeuvre and diagnosis.explanations and diagnosis.complete):
             return Answer(diagnosis, improved, None)
         told("looking for the manoeuvre that would settle it")
         found = next_run(diagnosis, train)
@@ -106,7 +110,13 @@ def show(diagnosis: Diagnosis, explain: bool = False) -> None:
 
     `explain` adds a row for every decision, in order.
     """
-    terminal.results.print(Panel(Text(diagnosis.summary), title=diagnosis.verdict, expand=False))
+    terminal.results.print(
+        Panel(
+            Text(diagnosis.summary),
+            title=diagnosis.verdict + ("" if diagnosis.complete else " (incomplete)"),
+            expand=False,
+        )
+    )
     parameters = [
         (found.label, symbol, measurement(one.value, one.standard_error), unit(one.unit), percent(found.probability))
         for found in diagnosis.physics

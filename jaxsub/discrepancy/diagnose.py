@@ -25,7 +25,7 @@ from .locate import Field, effect_shares, locations, shares, traces
 from .model import allowing_for
 from .name import Named
 from .process_noise import noise_note, noise_signals
-from .progress import Progress
+from .progress import Progress, limited
 from .show import channel_quality, coefficients, estimates, run_quality, trades
 from .stand_in import described
 from .summary import summary
@@ -47,14 +47,17 @@ def diagnose(
     *,
     vocabulary: tuple[type[AbstractEffect], ...] | None = None,
     progress: Progress = lambda message: None,
+    budget: float | None = None,
 ) -> tuple[Diagnosis, AbstractVehicle]:
     """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `test`.
 
     Nothing of the runs `test` takes part in a decision: the models are simulated along them once, at the end. Returns
     the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` is told what is
-    being done. **Raises** `InputError` where the recordings lack a column, or the model does not run from the
+    being done. After `budget` seconds no further effect is tried, and the answer so far is given, which then is not
+    `complete`. **Raises** `InputError` where the recordings lack a column, or the model does not run from the
     vehicle file's values or diverges along the recordings.
     """
+    until = limited(progress, budget)
     progress("fitting the baseline")
     start = fit(vehicle, batch(vehicle, train))
     if bool(start.result == RESULTS.nan_start):
@@ -68,7 +71,7 @@ def diagnose(
     found = examine(view, vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
-    trial, baseline = Trial(progress, vehicle), fitted_model(start, found.view, ())
+    trial, baseline = Trial(until, vehicle), fitted_model(start, found.view, ())
     named, judged, left = explained(trial, baseline, found, vocabulary)
     best, judged = (named, judged) if left is None else described(trial, named, left, judged, vocabulary)
     if best.pieces > 1:
@@ -140,6 +143,7 @@ def _told(
         explained=found,
         findings=_findings(vehicle, [*train, *test]),
         decisions=judged.decisions,
+        complete=judged.complete,
     )
     return diagnosis, improved.vehicle
 

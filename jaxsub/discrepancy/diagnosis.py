@@ -234,7 +234,8 @@ class Diagnosis:
     or the environment, by what was accepted and its rivals; where nothing was, by what a first look finds most of,
     which may be random forces and noise alone (`disturbance`). `file_p_value` is how probable the numbers found are
     where those of the vehicle file are right. `explained` is what the effects remove of the test runs' error, and
-    `findings` is what reading and checking the recordings found, and `decisions` are all choices in order.
+    `findings` is what reading and checking the recordings found, and `decisions` are all choices in order. It is
+    `complete` unless its time was spent before all was tried.
     """
 
     verdict: Verdict
@@ -262,6 +263,7 @@ class Diagnosis:
     explained: Explained | None = None
     findings: tuple[Finding, ...] = ()
     decisions: Sequence[Decision] = ()
+    complete: bool = True
 
     @property
     def improves(self) -> bool:
@@ -301,6 +303,7 @@ class Diagnosis:
         ]
         return {
             "schema": 1,
+            "complete": self.complete,
             "verdict": self.verdict,
             "summary": self.summary,
             "mismatch": {

@@ -1,6 +1,6 @@
 """What the recordings ask for, tried and asked again until what is left is random, refused or without a name."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from ..effects import AbstractEffect
 from ..results import RESULTS
@@ -9,8 +9,9 @@ from .evidence import evidence_of
 from .examine import examine, weighed
 from .many import by_what_comes_next
 from .name import MOST_EFFECTS
+from .progress import OutOfTime
 from .trial import Found, Model, Trial, tried, worth_trying
-from .verdict import EXPLAINED, NOTHING, Judged, both, by_fit, idle, judge
+from .verdict import EXPLAINED, NOTHING, Judged, both, by_fit, idle, incomplete, judge
 from .whiteness import share_of
 
 # times that others are asked where all that was named was refused
@@ -19,10 +20,27 @@ _REFUSALS = 2
 _MOST = 0.5
 
 
+# a model, what is to be said with it, and the last look at what it leaves, if anything may be left
+Answer = tuple[Model, Judged, Found | None]
+
+
 def explained(
     trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
-) -> tuple[Model, Judged, Found | None]:
-    """The model with what can be named, what is to be said, and the last look at what is left, if anything may be.
+) -> Answer:
+    """The model with what can be named, as `answers` ends; the answer so far where the time is spent before."""
+    best, judged, left = baseline, Judged("unknown", [], min(1.0, 2.0 * found.naming.first_p), []), None
+    try:
+        for answer in answers(trial, baseline, found, vocabulary):
+            best, judged, left = answer
+    except OutOfTime:
+        return best, incomplete(judged), None
+    return best, judged, left
+
+
+def answers(
+    trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
+) -> Iterator[Answer]:
+    """The answer after each round of proposals, of which the last is the one to be given.
 
     Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
     they leave is not random: far from the truth a linear picture shows the largest alone. Where the baseline does not
@@ -35,7 +53,8 @@ def explained(
     told_ahead = bool(baseline.fit.result != RESULTS.successful)
     ahead = by_what_comes_next(trial, baseline, vocabulary) if told_ahead else None
     if ahead is not None:
-        return *ahead, None
+        yield *ahead, None
+        return
     while True:
         said, after = judge(found.naming, found.pattern, found.memory), None
         chosen = worth_trying(found, said)
@@ -52,15 +71,18 @@ def explained(
         if chosen and not said.named:
             ahead = None if told_ahead else by_what_comes_next(trial, best, vocabulary)
             if ahead is not None:
-                return ahead[0], both(judged, ahead[1]), None
+                yield ahead[0], both(judged, ahead[1]), None
+                return
             told_ahead = True
             if said.verdict == "unknown" and refusals < _REFUSALS:
                 refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
         if after is None and not said.named:
-            return best, judged, found
+            yield best, judged, found
+            return
+        yield best, judged, None
         whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.remains)
         if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
-            return best, judged, None
+            return
         found = after or examine(best.view, vocabulary, trial.progress)
 
 

@@ -17,9 +17,10 @@ from ..likelihood import Disturbance
 from .cross_validation import compare
 from .examine import listed, weighed
 from .model import allowing_for, sound
+from .progress import OutOfTime
 from .selector import Selector
 from .trial import Found, Model, Trial
-from .verdict import Judged, helped, standing_in
+from .verdict import Judged, helped, incomplete, standing_in
 
 # effects that stand in at a time, sets of them that are fitted, and times that more are asked for
 _AT_ONCE, _TRIES, _TIMES = 4, 5, 3
@@ -34,7 +35,19 @@ _SHARES = (1.0, 0.5, 0.25)
 def described(
     trial: Trial, named: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged]:
-    """A `named` model with what describes what has no name in the last look at it, and what is to be said."""
+    """A `named` model with what describes what has no name in the last look at it, and what is to be said.
+
+    Where the time is spent before, it is the `named` model.
+    """
+    try:
+        return _described(trial, named, found, judged, vocabulary)
+    except OutOfTime:
+        return named, incomplete(judged)
+
+
+def _described(
+    trial: Trial, named: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
+) -> tuple[Model, Judged]:
     model, selector = named, found.selector
     for _ in range(_TIMES if found.remains else 0):
         more = _with_more(trial, named, model, selector)

@@ -23,13 +23,17 @@ _BEYOND_DOUBT = 1e-6
 
 @dataclasses.dataclass(frozen=True)
 class Judged:
-    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader, and every decision in order."""
+    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader, and every decision in order.
+
+    It is not `complete` where the time was spent before all was tried.
+    """
 
     verdict: Verdict
     named: list[Named]
     p_value: float
     notes: list[str]
     decisions: list[Decision] = dataclasses.field(default_factory=list)
+    complete: bool = True
 
 
 NOTHING = Judged("none", [], 1.0, [])
@@ -131,6 +135,13 @@ def _horizon(name: str, gain: Gain) -> str:
         return f"diverge {'without' if gain.total > 0.0 else 'with'} it {name}"
     size = f"{abs(gain.total):.4g} in log predictive density"
     return f"{'lose' if gain.total < 0.0 else 'gain'} {size} {name} (p = {gain.better:.2g})"
+
+
+def incomplete(judged: Judged) -> Judged:
+    """The verdict so far, of a diagnosis whose time is spent."""
+    tried = "before more candidates were tried" if judged.named else "before any effect was accepted"
+    note = f"The time budget was spent {tried}: this answer is incomplete."
+    return dataclasses.replace(judged, notes=[*judged.notes, note], complete=False)
 
 
 def by_fit(judged: Judged, share: float) -> Judged:

@@ -44,3 +44,14 @@ def test_nothing_of_the_test_run_takes_part_in_a_decision():
         k: float(v) for k, v in improved_again.values().items()
     }
     assert found.fit["train"] == again.fit["train"] and found.fit["held_out"] != again.fit["held_out"]
+
+
+def test_a_spent_budget_gives_the_answer_so_far():
+    """Claim: with no time for any fit the mismatch is there, incomplete and without a name; the test run is shown."""
+    truth = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-0.4)))
+    inputs = [driven(truth, 0.1 * np.arange(300), seed, amplitude=1.0) for seed in range(3)]
+    runs = synthetic(truth, inputs, seed=4)
+    found, _ = diagnose(oscillator(), runs[:2], runs[2:], vocabulary=KINDS, budget=0.0)
+    assert (found.complete, found.verdict, found.physics) == (False, "unknown", [])
+    assert found.p_value < 1e-6 and "incomplete" in found.notes[-1]
+    assert found.to_json()["complete"] is False and found.fit["held_out"]["baseline"]
