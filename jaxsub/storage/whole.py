@@ -16,8 +16,10 @@ _HERE, _EXCHANGE = -100, 2  # AT_FDCWD and RENAME_EXCHANGE of Linux
 def written_whole(path: Path) -> Iterator[Path]:
     """A path to write a file to, which takes the place of the file at `path` when the block ends well.
 
-    **Raises** `InputError` where another process writes to `path`, and `OSError` where it cannot be written.
+    **Raises** `InputError` where another process writes to `path`, and `OSError` where it cannot be written, as in a
+    folder that does not exist.
     """
+    path.parent.stat()
     with scratch(path) as folder:
         beside = folder / path.name
         yield beside
