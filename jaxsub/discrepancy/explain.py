@@ -28,13 +28,15 @@ def explained(
     trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> Answer:
     """The model with what can be named, as `answers` ends; the answer so far where the time is spent before."""
-    best, judged, left = baseline, Judged("unknown", [], min(1.0, 2.0 * found.naming.first_p), []), None
+    answer: Answer | None = None
     try:
         for answer in answers(trial, baseline, found, vocabulary):
-            best, judged, left = answer
+            pass
     except OutOfTime:
-        return best, incomplete(judged), None
-    return best, judged, left
+        best, judged, _ = answer or (baseline, Judged("unknown", [], min(1.0, 2.0 * found.naming.first_p), []), None)
+        answer = best, incomplete(judged), None
+    assert answer is not None
+    return answer
 
 
 def answers(

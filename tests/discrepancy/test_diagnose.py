@@ -78,7 +78,7 @@ def test_names_locates_and_improves(effect, vocabulary):
     for channel, left in found.remains["improved"].items():
         assert min(left.random, left.independent) > 1e-3
         assert left.low < after[channel] < left.high
-    assert found.gain.ratio < 0.8 and found.gain.p_value < 0.01
+    assert found.gain.ratio < 0.8 and found.gain.p_value < 0.05
     outcomes = {candidate.label: candidate.outcome for candidate in found.candidates}
     assert outcomes[physics.label] == "accepted"
     assert {outcomes[rival.label] for rival in physics.rivals if rival.label in outcomes} <= {"rival"}
