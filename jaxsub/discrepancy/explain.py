@@ -30,8 +30,8 @@ def explained(
     """The model with what can be named, as `answers` ends; the answer so far where the time is spent before."""
     answer: Answer | None = None
     try:
-        for answer in answers(trial, baseline, found, vocabulary):
-            pass
+        for so_far in answers(trial, baseline, found, vocabulary):
+            answer = so_far
     except OutOfTime:
         best, judged, _ = answer or (baseline, Judged("unknown", [], min(1.0, 2.0 * found.naming.first_p), []), None)
         answer = best, incomplete(judged), None
