@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.estimate import METHODS, AbstractMethod, Problem, channel_rms, output_errors, scattered
+from jaxsub.estimate import METHODS, AbstractMethod, Problem, channel_rms, scattered
+from jaxsub.likelihood import output_errors
 from jaxsub.recording import Recording
 from jaxsub.results import RESULTS
 from jaxsub.simulate import at_rest

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Array
 
 from jaxsub.discrepancy import batch
-from jaxsub.estimate import fit, output_errors, search
+from jaxsub.estimate import fit, search
+from jaxsub.likelihood import output_errors
 from jaxsub.recording import Recording
 from jaxsub.vehicle import AbstractVehicle, read_vehicle, vehicle_text
 

@@ -177,7 +177,7 @@ def _left(others: Float[np.ndarray, "q q"], block: Float[np.ndarray, "q q"]) -> 
 
 def _simulation_products(fit: Fit, blocks: int) -> Float[np.ndarray, "r b q q"]:
     """Products by block of simulation errors over σ and their derivatives by free numbers and the initial state."""
-    runs, model = fit.runs, fit.model
+    runs, model = fit.runs, fit.model.whole
     weight = (np.asarray(runs.mask) / np.asarray(fit.sigma))[..., None]
     parts = (model.error[..., None], model.theta, model.start)
     samples = 1 + np.asarray(runs.live).sum(axis=1)

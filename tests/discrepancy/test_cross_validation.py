@@ -15,7 +15,7 @@ from jaxsub.discrepancy.verdict import NOTHING, helped
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull_damping import CubicDamping
 from jaxsub.estimate import fit
-from jaxsub.likelihood import linearise, whitened
+from jaxsub.likelihood import BlockLinearised, whitened
 from jaxsub.simulate import synthetic
 
 
@@ -99,7 +99,7 @@ def test_a_block_of_a_simulation_has_the_errors_of_a_fit_to_the_others():
     """Claim: it equals the squared errors after least squares on the other blocks, the initial states following."""
     whole = fitted()
     found = simulated(whole, 4)
-    model, weight = whole.model, np.asarray(whole.runs.mask) / np.asarray(whole.sigma)
+    model, weight = whole.model.whole, np.asarray(whole.runs.mask) / np.asarray(whole.sigma)
     spread = np.asarray(whole.problem.spread)
     error, theta, start = (np.asarray(part) for part in (model.error, model.theta, model.start))
     theta, start = theta * weight[..., None], start * weight[..., None] * spread
@@ -123,6 +123,6 @@ def test_a_vehicle_that_runs_away_is_predicted_nowhere():
     """Claim: a model that diverges along the training runs has no density in any block, and no NaN."""
     whole = fitted()
     away = whole.vehicle.with_values({"D_x": jnp.asarray(-1e3)})
-    model = linearise(away, whole.runs, whole.start)
+    model = BlockLinearised.of(away, whole.runs, whole.start, whole.sigma, whole.problem.spread)
     assert not bool(jnp.all(jnp.isfinite(model.error)))
     assert np.all(np.isneginf(simulated(dataclasses.replace(whole, vehicle=away, model=model))))
