@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from jax import Array
 
+from jaxsub.arrays import Values
 from jaxsub.effects import Motion
 
 WATER = 1025.0
@@ -22,7 +23,7 @@ class Moment(NamedTuple):
     t: Array
     motion: Motion
     memory: Array
-    damping: Array
+    damping: Values
 
     @property
     def rates(self) -> Mapping[str, Any]:

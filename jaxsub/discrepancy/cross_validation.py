@@ -15,15 +15,12 @@ correlated).
 
 from typing import NamedTuple
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from scipy import special
 
 from ..estimate import Fit, Problem
-from ..likelihood import Columns, Disturbance, System, part_products
+from ..likelihood import part_products
 from .evidence import integrated
 from .view import View
 
@@ -32,8 +29,6 @@ LEVEL = 0.05
 # blocks of each run one step ahead, and of simulation errors, which are correlated for longer
 _SHORT_BLOCKS, LONG_BLOCKS = 24, 4
 _TINY = 1e-300
-# columns of a program are a multiple of this many
-_WIDTH = 8
 
 
 class Predicted(NamedTuple):
@@ -109,12 +104,8 @@ def gain(before: Float[np.ndarray, " n"], after: Float[np.ndarray, " n"]) -> Gai
 
 def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     """`Predicted.one_step` of a view's vehicle under the view's disturbance."""
-    known = len(view.prior)
-    # few shapes, and so few programs: empty columns are taken out again
-    padded = jax.tree.map(lambda M: jnp.pad(M, [(0, 0)] * 3 + [(0, -known % _WIDTH)]), view.base)
-    found = _block_products(view.disturbance, view.followed.system, padded)
-    products, logarithms = (np.asarray(part).reshape(-1, *part.shape[2:]) for part in found)
-    products = products[:, :known, :known]
+    found = part_products(view.disturbance, view.followed.system, view.base, _SHORT_BLOCKS)
+    products, logarithms = (part.reshape(-1, *part.shape[2:]) for part in found)
     # what lies beyond the end of a short run has nothing
     there = (logarithms != 0.0) | np.any(products != 0.0, axis=(1, 2))
     products, logarithms = products[there], logarithms[there]
@@ -123,14 +114,6 @@ def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
         return np.full(len(products), -np.inf)
     whole = integrated(gram)
     return np.array([whole - integrated(gram - part) for part in products]) - logarithms
-
-
-@eqx.filter_jit
-def _block_products(
-    disturbance: Disturbance, system: System, columns: Columns
-) -> tuple[Float[Array, "r m q q"], Float[Array, "r m"]]:
-    """Products of the whitened columns in each block of every run, and half the log-determinant there."""
-    return part_products(disturbance, system, columns, _SHORT_BLOCKS)
 
 
 def simulated(fit: Fit, blocks: int = LONG_BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float
 from scipy.linalg import block_diag
 
 from ..estimate import estimate_disturbance
