@@ -135,7 +135,9 @@ class Recording:
             raise InputError(self.source, f"has {times.size} samples", "a recording needs at least two")
         if (row := self._first(~np.isfinite(times))) is not None:
             raise InputError(f"{self.source}, row {row}", "the time is missing or not finite", "give every row a time")
-        steps = np.diff(times)
+        # of times that lie further apart than any number the step is infinite
+        with np.errstate(over="ignore"):
+            steps = np.diff(times)
         if (steps <= 0.0).any():
             raise self._disorder(steps)
 

@@ -83,7 +83,7 @@ class Runs(eqx.Module):
         samples, begins = self.times.shape[1], jnp.asarray(begins)
         index = begins[:, None] + jnp.arange(length + 1)
         inside, between = jnp.minimum(index, samples - 1), jnp.minimum(index[:, :-1], samples - 2)
-        cut = lambda array, at: array[:, at].reshape(-1, *at.shape[1:], *array.shape[2:])
+        cut = lambda array, at: array[:, at].reshape(len(array) * len(begins), *at.shape[1:], *array.shape[2:])
         owned = (jnp.arange(length + 1) < length) | jnp.asarray(last)[:, None]
         every = lambda array: jnp.tile(array, (self.times.shape[0], 1))
         return dataclasses.replace(

@@ -88,7 +88,7 @@ def test_an_out_that_exists_is_refused_and_left_alone(tmp_path, monkeypatch, cap
     (out / "mine.txt").write_text("keep", encoding="utf-8")
     files = [] if command == "demo" else [tmp_path / "vehicle.toml", tmp_path / "run.csv"]
     code, said = stopped(monkeypatch, capsys, command, *files, "--out", out)
-    assert code == 2 and said.count("\n") == 1 and "--overwrite" in said
+    assert code == 2 and said.count("\n") == 1 and ("--out" if command == "simulate" else "--overwrite") in said
     assert [p.name for p in out.iterdir()] == ["mine.txt"]
 
 

@@ -11,9 +11,8 @@ from rigs import driven, oscillator
 from scipy.integrate import solve_ivp
 
 from jaxsub.discrepancy import batch
-from jaxsub.discrepancy.show import hold
-from jaxsub.estimate import fit
-from jaxsub.likelihood import Disturbance
+from jaxsub.estimate import channel_rms, fit, search
+from jaxsub.likelihood import output_errors
 from jaxsub.recording import load, save
 from jaxsub.simulate import synthetic
 from jaxsub.vehicle import read_vehicle, write_vehicle
@@ -55,7 +54,7 @@ def told(monkeypatch, capsys, folder, *options, **others):
 
 
 def test_the_error_is_that_of_a_fit_and_of_a_diagnosis(rig, monkeypatch, capsys):
-    """Claim: from the estimated start rms/σ is `fit`'s with every coefficient fixed, and a diagnosis' on a test run."""
+    """Claim: from the estimated start rms/σ is `fit`'s with every coefficient fixed, and that of a search of the start."""
     found = told(monkeypatch, capsys, rig)
     assert found["start"] == "estimated"
     over = {channel: one["rms_over_sigma"] for channel, one in found["fit"].items()}
@@ -65,8 +64,9 @@ def test_the_error_is_that_of_a_fit_and_of_a_diagnosis(rig, monkeypatch, capsys)
     assert not fixed.layout.free
     assert over == pytest.approx(fit(fixed, runs).rms, rel=1e-6)
     sigma = jnp.array([output.sigma for output in vehicle.layout.outputs])
-    still = Disturbance(jnp.full(1, 1e-9), jnp.ones(1), jnp.ones(2))
-    assert over == pytest.approx(hold(vehicle, runs, [0], 1, sigma, still).rms, rel=1e-6)
+    start = search(vehicle, runs, sigma=sigma, moving=False).start
+    error = output_errors(vehicle, runs, start) / sigma
+    assert over == pytest.approx(channel_rms(error, runs, vehicle.layout.channels), rel=1e-6)
     assert max(over.values()) > 2.0
 
 

@@ -129,7 +129,7 @@ def test_what_is_not_random_or_goes_with_an_input_is_flagged():
     assert text.count("(rudder)") == sum(left.independent < 1e-3 for left in remains) > 0
     table = text[text.index("What remains there") :].split("</table>")[0]
     assert table.count(" flag") == sum((left.independent < 1e-3) + (left.random < 1e-3) for left in remains)
-    assert "keep 12\u202f% of their squared error" in Outline(text).text.replace("\xa0", "\u202f")
+    assert "12\u202f% of the squared simulation error is left" in Outline(text).text.replace("\xa0", "\u202f")
 
 
 def test_what_checks_found_is_a_section_of_its_own():
