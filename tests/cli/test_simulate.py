@@ -53,8 +53,8 @@ def told(monkeypatch, capsys, folder, *options, **others):
     return json.loads(said.out)
 
 
-def test_the_error_is_that_of_a_fit_and_of_a_diagnosis(rig, monkeypatch, capsys):
-    """Claim: from the estimated start rms/σ is `fit`'s with every coefficient fixed, and that of a search of the start."""
+def test_the_error_is_that_of_a_fit_and_of_a_search(rig, monkeypatch, capsys):
+    """Claim: from the estimated start rms/σ is `fit`'s with every coefficient fixed, and a search's of the start."""
     found = told(monkeypatch, capsys, rig)
     assert found["start"] == "estimated"
     over = {channel: one["rms_over_sigma"] for channel, one in found["fit"].items()}
