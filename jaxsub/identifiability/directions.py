@@ -139,11 +139,16 @@ def _triangle(problem: Problem, model: BlockLinearised, watch: Watch) -> Float[n
     p, s = len(problem.prior_mean), len(problem.spread)
     left = np.zeros((len(problem.runs.times), 0, s + p))
     for index in range(len(model)):
-        left = np.linalg.qr(np.concatenate([left, _block_triangle(problem, *model[index])], axis=1), mode="r")
+        left = _upper(np.concatenate([left, _block_triangle(problem, *model[index])], axis=1))
         watch((index + 1) / len(model))
     prior = np.broadcast_to(np.eye(s, s + p), (len(left), s, s + p))
-    rows = np.linalg.qr(np.concatenate([prior, left], axis=1), mode="r")[:, s:, s:].reshape(-1, p)
-    return np.linalg.qr(np.concatenate([rows, np.diag(1.0 / np.asarray(problem.prior_std))]), mode="r")
+    rows = _upper(np.concatenate([prior, left], axis=1))[:, s:, s:].reshape(-1, p)
+    return _upper(np.concatenate([rows, np.diag(1.0 / np.asarray(problem.prior_std))]))
+
+
+def _upper(matrix: Float[np.ndarray, "*r n q"]) -> Float[np.ndarray, "*r m q"]:
+    """R of the decompositions of matrices."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
 @eqx.filter_jit
