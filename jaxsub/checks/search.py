@@ -11,9 +11,10 @@ from .increments import Comparison, Windows, compared, filled, white
 from .mends import ANGLES, Kind, Mend, gross, is_angular, known_factor, late
 from .relations import Motions, Relation
 
-_SURE = 30.0  # log likelihood ratio of a fault, less what its kind costs
-# kinds with free numbers explain more by chance
+_SURE = 30.0  # log likelihood ratio of a fault, less what it costs
+# what is free to take any value explains more by chance, and is less likely before the data than a unit that is known
 _COST = {"sign": 0.0, "axis": 2.0, "factor": 4.0, "delay": 8.0, "drift": 8.0, "clock": 16.0}
+_FREE = 8.0  # of a factor between no units that are known
 _AGREED = 0.3  # distance between a channel and its rate, beyond which a mend is none
 _BAD = 0.004  # distance below which no factor is looked for
 _ARMED = 0.1  # distance of sides with lever arms below which no factor is named
@@ -65,8 +66,8 @@ class Search:
         ]
         if not scored:
             return None
-        score, mend, relation = max(scored, key=lambda entry: entry[0] - _COST[entry[1].kind])
-        return (mend, relation) if score - _COST[mend.kind] > _SURE else None
+        score, mend, relation = max(scored, key=lambda entry: entry[0] - self._cost(entry[1]))
+        return (mend, relation) if score - self._cost(mend) > _SURE else None
 
     def distance(self, relation: Relation, mend: Mend) -> float:
         """The least distance of a relation with `mend`."""
@@ -175,7 +176,7 @@ class Search:
             return False
         if mend.kind != "factor":
             return True
-        if not relation.direct and found.distance > _KNOWN_ONLY and not known_factor(*self._angular(mend), 1e-9):
+        if not relation.direct and found.distance > _KNOWN_ONLY and not self._is_known(mend):
             return False
         # a lever arm may look like a factor of a motion that hardly turns
         armed = relation.arms is not None
@@ -184,8 +185,12 @@ class Search:
         size = max(abs(mend.amount), 1.0 / abs(mend.amount))
         return mend.amount < 0.0 or size > (_FACTOR if relation.exact and not armed else _ROUGH)
 
-    def _angular(self, mend: Mend) -> tuple[bool, float]:
-        return is_angular(mend.channels[0]), mend.amount
+    def _cost(self, mend: Mend) -> float:
+        return _COST[mend.kind] + (_FREE if mend.kind == "factor" and not self._is_known(mend) else 0.0)
+
+    def _is_known(self, mend: Mend) -> bool:
+        """Whether a factor is one between units."""
+        return bool(known_factor(is_angular(mend.channels[0]), mend.amount, 1e-9))
 
     def _interval(self, name: str) -> float:
         return float(np.median(np.diff(self._times[np.isfinite(self._raw.columns[name])])))
