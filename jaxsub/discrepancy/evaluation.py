@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -59,7 +58,7 @@ def evaluated(
             errors += list(np.asarray(residual_outputs(model.fit.vehicle, taken, shown))[: len(chosen)])
         whole = finer.take(range(size, size + len(test)), len(test))
         white = np.stack(errors) / np.asarray(model.fit.sigma)
-        rms = channel_rms(jnp.asarray(white), whole, vehicle.layout.channels)
+        rms = channel_rms(white, whole, vehicle.layout.channels)
         squares = np.sum(white**2, axis=-1)
         found.append(Evaluation(predicted, errors, rms, list(np.where(np.isnan(squares), np.inf, squares))))
     return found

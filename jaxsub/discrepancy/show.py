@@ -62,7 +62,7 @@ def _verdict(estimate: Estimate) -> str:
 
 def channel_quality(fit: Fit) -> list[ChannelQuality]:
     """Samples and noise of each measured channel of the training runs."""
-    mask, error = np.asarray(fit.runs.mask), np.asarray(fit.model.error)
+    mask, error, stated = np.asarray(fit.runs.mask), np.asarray(fit.model.error), np.asarray(fit.sigma)
     white = record_sigma(error, mask)
     live = 1 + np.asarray(fit.runs.live).sum(1)
     rows = []
@@ -70,7 +70,7 @@ def channel_quality(fit: Fit) -> list[ChannelQuality]:
         samples = int(mask[..., i].sum())
         unit = fit.vehicle.layout.unit(output.channel)
         missing = 1.0 - samples / live.sum()
-        sigma = float(fit.sigma[i])
+        sigma = float(stated[i])
         rows.append(
             ChannelQuality(output.channel, unit, samples, missing, sigma, output.sigma is None, float(white[i]))
         )

@@ -66,7 +66,7 @@ def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None, watch:
     `watch` is told the share of the samples that is done.
     """
     problem, model = fit.problem, fit.model
-    reduced = _reduced(problem, model.products, fit.pressed != 0.0)
+    reduced = _reduced(problem, model.products, np.asarray(fit.pressed) != 0.0)
     if disturbance is None:
         disturbance = _estimated(problem, *_windows(model), reduced)
     adjoint = Adjoint.at_end(len(problem.guess), len(problem.spread), len(disturbance.force), len(fit.names))

@@ -208,7 +208,8 @@ class Adjoint(NamedTuple):
     def at_end(cls, runs: int, states: int, forces: int, columns: int) -> "Adjoint":
         """Beyond the last sample."""
         r, s, n, p = runs, states, forces, columns
-        return cls(jnp.zeros((r, s, p)), jnp.zeros((r, n, p)), jnp.zeros((r, n, p)), jnp.zeros((p, p)))
+        # by NumPy, for which no program has to be made
+        return cls(*jax.device_put([np.zeros(shape) for shape in ((r, s, p), (r, n, p), (r, n, p), (p, p))]))
 
 
 def carried(disturbance: Disturbance, system: System, weights: Float[Array, "r k c p"]) -> Float[Array, "p p"]:

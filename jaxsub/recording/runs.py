@@ -8,8 +8,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
+from ..arrays import Values, namespace
 from .recording import Recording
 from .turns import unwrapped, unwrapped_mechanism, without_jumps
 
@@ -78,14 +79,15 @@ class Runs(eqx.Module):
         begins = jnp.asarray(begin)[None]
         return self._pieces(begins, length, begins + length >= self.times.shape[1] - 1)
 
-    def _pieces(self, begins: ArrayLike, length: int, last: ArrayLike) -> "Runs":
+    def _pieces(self, begins: Values, length: int, last: Values) -> "Runs":
         """The pieces of `length` intervals from each of the samples `begins`; those `last` measure their end."""
-        samples, begins = self.times.shape[1], jnp.asarray(begins)
-        index = begins[:, None] + jnp.arange(length + 1)
-        inside, between = jnp.minimum(index, samples - 1), jnp.minimum(index[:, :-1], samples - 2)
+        # where begins are NumPy's no program has to be made
+        xp, samples = namespace(begins), self.times.shape[1]
+        index = begins[:, None] + xp.arange(length + 1)
+        inside, between = xp.minimum(index, samples - 1), xp.minimum(index[:, :-1], samples - 2)
         cut = lambda array, at: array[:, at].reshape(len(array) * len(begins), *at.shape[1:], *array.shape[2:])
-        owned = (jnp.arange(length + 1) < length) | jnp.asarray(last)[:, None]
-        every = lambda array: jnp.tile(array, (self.times.shape[0], 1))
+        owned = (xp.arange(length + 1) < length) | last[:, None]
+        every = lambda array: xp.tile(array, (self.times.shape[0], 1))
         return dataclasses.replace(
             self,
             times=cut(self.times, inside),
