@@ -20,8 +20,7 @@ from jaxtyping import Float
 from scipy import special
 
 from ..estimate import Fit, Problem
-from ..likelihood import part_products
-from .evidence import integrated
+from .evidence import conditional
 from .view import View
 
 # level at which one model is called better or worse than another
@@ -104,16 +103,14 @@ def gain(before: Float[np.ndarray, " n"], after: Float[np.ndarray, " n"]) -> Gai
 
 def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     """`Predicted.one_step` of a view's vehicle under the view's disturbance."""
-    found = part_products(view.disturbance, view.followed.system, view.base, _SHORT_BLOCKS)
-    products, logarithms = (part.reshape(-1, *part.shape[2:]) for part in found)
+    products, logarithms = view.products(view.base, view.disturbance, _SHORT_BLOCKS)
     # what lies beyond the end of a short run has nothing
     there = (logarithms != 0.0) | np.any(products != 0.0, axis=(1, 2))
     products, logarithms = products[there], logarithms[there]
     gram = products.sum(axis=0) + np.asarray(view.prior)
     if not np.all(np.isfinite(gram)):
         return np.full(len(products), -np.inf)
-    whole = integrated(gram)
-    return np.array([whole - integrated(gram - part) for part in products]) - logarithms
+    return conditional(gram, products, logarithms)
 
 
 def simulated(fit: Fit, blocks: int = LONG_BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:

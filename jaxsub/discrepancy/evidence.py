@@ -49,6 +49,17 @@ def integrated(gram: Float[np.ndarray, "q q"]) -> float:
     return -0.5 * float(squares + np.linalg.slogdet(gram[1:, 1:])[1])
 
 
+def conditional(
+    gram: Float[np.ndarray, "q q"], parts: Float[np.ndarray, "m q q"], spreads: Float[np.ndarray, " m"]
+) -> Float[np.ndarray, " m"]:
+    r"""Log density of each part of the recordings given the others, $\ln Z(H) - \ln Z(H - H_b) - \ln|L_b|$.
+
+    `gram` is H, the products of [r, J], priors included, `parts` are the $H_b$ without them, `spreads` the $\ln|L_b|$.
+    """
+    whole = integrated(gram)
+    return np.array([whole - integrated(gram - part) for part in parts]) - spreads
+
+
 @dataclasses.dataclass(frozen=True)
 class Products:
     """Products of all columns under one disturbance.
@@ -72,13 +83,13 @@ class Products:
 
         At the numbers that the others like best, what they hardly tell would count as a wrong prediction.
         """
-        whole = self._integrated(self.gram, chosen)
-        return np.array([whole - self._integrated(self.gram - part, chosen) for part in self.parts]) - self.spreads
+        at = np.ix_([0, *self._index(chosen)], [0, *self._index(chosen)])
+        return conditional(self._with_priors(chosen), self.parts[:, *at], self.spreads)
 
     def log_evidence(self, chosen: Sequence[int]) -> float:
         """Of the recordings with the candidate columns `chosen` in the model."""
         priors = 0.5 * len(chosen) * np.log(self.samples)
-        return self._integrated(self.gram, chosen) - float(np.sum(self.spreads)) - priors
+        return integrated(self._with_priors(chosen)) - float(np.sum(self.spreads)) - priors
 
     def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> Gains:
         """What each further candidate would add to `chosen`."""
@@ -124,7 +135,7 @@ class Products:
     def weights(self, chosen: Sequence[int]) -> np.ndarray:
         """(1 + p + q,) of the columns whose sum is the residual less what parameters and `chosen` take up of it."""
         index, found = self._index(chosen), np.zeros(len(self.gram))
-        found[0], found[index] = 1.0, -np.linalg.solve(self._block(self.gram, chosen), self.gram[index, 0])
+        found[0], found[index] = 1.0, -np.linalg.solve(self._with_priors(chosen)[1:, 1:], self.gram[index, 0])
         return found
 
     def fall(self, chosen: Sequence[int]) -> float:
@@ -150,17 +161,11 @@ class Products:
         """Where the free parameters and the candidate columns `chosen` are."""
         return [*range(1, self.known), *(self.known + c for c in chosen)]
 
-    def _block(self, gram: np.ndarray, chosen: Sequence[int]) -> np.ndarray:
-        """Their products in `gram`, with the priors of the `chosen`."""
-        index = self._index(chosen)
-        worth = np.repeat([0.0, 1.0 / self.samples], [self.known - 1, len(chosen)])
-        return gram[np.ix_(index, index)] + np.diag(worth)
-
-    def _integrated(self, gram: np.ndarray, chosen: Sequence[int]) -> float:
-        """`integrated` over the free parameters and the amplitudes of `chosen`, by products `gram` of all."""
+    def _with_priors(self, chosen: Sequence[int]) -> Float[np.ndarray, "q q"]:
+        """Products of the residual, the free parameters and the `chosen` columns, with the priors of the latter."""
         index = [0, *self._index(chosen)]
         worth = np.repeat([0.0, 1.0 / self.samples], [self.known, len(chosen)])
-        return integrated(gram[np.ix_(index, index)] + np.diag(worth))
+        return self.gram[np.ix_(index, index)] + np.diag(worth)
 
     def _left(self, chosen: Sequence[int], more: Sequence[int] | None = None) -> np.ndarray:
         """(1 + q, 1 + q) products of the residual and candidates, less what `chosen` and parameters take up.
@@ -169,7 +174,7 @@ class Products:
         """
         rest = [0, *(self.known + c for c in (range(len(self.gram) - self.known) if more is None else more))]
         mixed = self.gram[np.ix_(self._index(chosen), rest)]
-        return self.gram[np.ix_(rest, rest)] - mixed.T @ np.linalg.solve(self._block(self.gram, chosen), mixed)
+        return self.gram[np.ix_(rest, rest)] - mixed.T @ np.linalg.solve(self._with_priors(chosen)[1:, 1:], mixed)
 
 
 @dataclasses.dataclass(frozen=True)

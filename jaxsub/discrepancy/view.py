@@ -106,13 +106,14 @@ class View:
         return bool(np.all(np.isfinite(self.covariance)))
 
     def products(
-        self, columns: Columns, disturbance: Disturbance
+        self, columns: Columns, disturbance: Disturbance, pieces: int | None = None
     ) -> tuple[Float[np.ndarray, "m q q"], Float[np.ndarray, " m"]]:
         """Products of `columns` whitened under a disturbance, in m parts of the recordings, and half the
-        log-determinant of each part's covariance.
+        log-determinant of each part's covariance. Every run is cut into so many `pieces`, or so that there are four.
         """
         system = self.followed.system
-        found, spreads = part_products(disturbance, system, columns, max(1, -(-_PARTS // len(system.measured))))
+        pieces = pieces or max(1, -(-_PARTS // len(system.measured)))
+        found, spreads = part_products(disturbance, system, columns, pieces)
         return found.reshape(-1, *found.shape[2:]), spreads.reshape(-1)
 
     def measured(self, channel: str) -> np.ndarray:

@@ -72,14 +72,12 @@ class BlockLinearised(eqx.Module):
         watch: Watch = nobody,
     ) -> "BlockLinearised":
         """`vehicle` linearised along its trajectory from the initial states `start`."""
-        length, at = block_length(vehicle, runs), Checkpoint.at_start(vehicle, start)
-        begins, errors, summed, only = [], [], [], None
-        for block in _blocks(runs, length, watch):
+        length, begins, errors, summed, only = block_length(vehicle, runs), [], [], [], None
+        for at, model, products in _passed(vehicle, runs, start, sigma, spread, watch):
             begins.append(at)
-            model, products, at = _block(vehicle, block, at, sigma, spread)
-            summed.append(np.asarray(products))
+            summed.append(products)
             errors.append(model.error)
-            only = model if block is runs else None
+            only = model if length >= runs.times.shape[1] - 1 else None
         return cls(
             vehicle,
             runs,
@@ -130,11 +128,19 @@ def summed_products(
     watch: Watch = nobody,
 ) -> Float[Array, "r q q"]:
     """The `products` of `BlockLinearised` alone."""
-    at, summed = Checkpoint.at_start(vehicle, start), []
+    passed = _passed(vehicle, runs, start, sigma, spread, watch)
+    return jax.device_put(np.sum([products for _, _, products in passed], axis=0))
+
+
+def _passed(
+    vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Array, spread: Array, watch: Watch
+) -> Iterator[tuple[Checkpoint, Linearised, np.ndarray]]:
+    """Where each block begins, the model linearised along it, and the products of its whitened columns."""
+    at = Checkpoint.at_start(vehicle, start)
     for block in _blocks(runs, block_length(vehicle, runs), watch):
-        _, products, at = _block(vehicle, block, at, sigma, spread)
-        summed.append(np.asarray(products))
-    return jax.device_put(np.sum(summed, axis=0))
+        model, products, after = _block(vehicle, block, at, sigma, spread)
+        yield at, model, np.asarray(products)
+        at = after
 
 
 def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:

@@ -35,7 +35,7 @@ class Followed(eqx.Module):
     - `residual`: one column, the measured outputs less those expected, and what led the path away from a free run.
     - `theta`: p columns, by the free parameters.
     - `products`: (1 + p, 1 + p) of the residual and `theta`, whitened under the disturbance; `spread`: half the
-      log-determinant of the residual's covariance; `log_likelihood`: (R, K) of each sample given those before it.
+      log-determinant of the residual's covariance.
     """
 
     expected: Float[Array, "r k s"]
@@ -46,7 +46,6 @@ class Followed(eqx.Module):
     theta: Columns
     products: Float[Array, "p1 p1"]
     spread: Float[Array, ""]
-    log_likelihood: Float[Array, "r k"]
 
 
 @eqx.filter_jit
@@ -75,10 +74,9 @@ def follow(
     theta = Columns(jnp.where(runs.mask[..., None], by.direct / sigma[:, None], 0.0), by.F)
     # whoever has a path wants its likelihood: in one program both are compiled in the time of one
     white, factor = whitened(disturbance, system, residual + theta)
-    logarithm = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)), axis=-1)
-    log_likelihood = -logarithm - 0.5 * jnp.sum(white[..., 0] ** 2, axis=-1)
+    logarithm = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)))
     products = jnp.einsum("rkca,rkcb->ab", white, white)
-    return Followed(expected, filtered, force, system, residual, theta, products, jnp.sum(logarithm), log_likelihood)
+    return Followed(expected, filtered, force, system, residual, theta, products, logarithm)
 
 
 def _path(
