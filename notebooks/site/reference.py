@@ -40,7 +40,10 @@ class Reference(NamedTuple):
         """Of a package as it is installed here."""
         # imported before pdoc does, which forbids modules to ask the machine what it is
         for found in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
-            importlib.import_module(found.name)
+            module = importlib.import_module(found.name)
+            # pdoc lists what is in a module already, and a package may import its names when they are asked for
+            for name in getattr(module, "__all__", ()):
+                getattr(module, name)
         modules = {name: pdoc.doc.Module.from_name(name) for name in pdoc.extract.walk_specs([package, *_BESIDE])}
         addresses = {}
         for name, module in modules.items():
