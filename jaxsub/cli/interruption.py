@@ -40,6 +40,7 @@ class Watch:
         self._message, self._interrupted = message, False
         self._handlers: dict[int, Any] = {}
         self._terminal = _CLOSED_FILE
+        self._word, self._spoken = threading.Lock(), False
 
     def __enter__(self) -> "Watch":
         # its own, since standard error is turned away while readers of logs run
@@ -66,6 +67,13 @@ class Watch:
         """Let the command go on after the first signal, to keep what it has; a second one still ends it."""
         self._write.send(_ANSWERED)
 
+    def last_word(self, say: Callable[[], object]) -> None:
+        """`say()`, unless the process has said its last word, as the watching thread may while this one ends."""
+        with self._word:
+            if not self._spoken:
+                self._spoken = True
+                say()
+
     def _interrupt(self, *_: object) -> None:
         # a second one would break off what answers the first
         if not self._interrupted:
@@ -91,11 +99,14 @@ class Watch:
                     interrupted = True
                     signals.settimeout(GRACE)
         abandon()
+        self.last_word(self._say)
+        leave(INTERRUPTED)
+
+    def _say(self) -> None:
         with contextlib.suppress(OSError):
             # a spinner has hidden the cursor
             shown = "\x1b[?25h\n" if os.isatty(self._terminal) else ""
             os.write(self._terminal, f"{shown}{self._message()}\n".encode(errors="replace"))
-        leave(INTERRUPTED)
 
 
 def interruptible(of: Callable[[], T], watch: Watch | None) -> T:

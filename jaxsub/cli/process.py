@@ -84,7 +84,7 @@ def run(app: click.Group) -> None:
     with Watch(lambda: _line(_interruption(options))) as options.watch:
         code, message = _ended(app, options)
         if message:
-            print(_line(message), file=sys.stderr)
+            options.watch.last_word(lambda: print(_line(message), file=sys.stderr))
         if code:
             leave(code)
 

@@ -3,12 +3,14 @@
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 from commands import environment
 from rigs import write_rig
 from trees import tree
 
+from jaxsub.cli.interruption import Watch
 from jaxsub.cli.output import fresh_folder
 
 ENDLESS = """
@@ -87,6 +89,18 @@ def test_endless_call_is_ended_and_the_old_result_stays(tmp_path, grace, numbers
     _, said = ended(begun(tmp_path, WRITER, "write", grace), *numbers)
     assert said == "jaxsub: interrupted; nothing was written\n"
     assert tree(tmp_path) == before
+
+
+def test_last_word_is_said_once():
+    """Claim: where the main thread and the watching one both come to say how the process ends, one of them does."""
+    said = []
+    with Watch(str) as watch:
+        threads = [threading.Thread(target=watch.last_word, args=(lambda: said.append(1),)) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert said == [1]
 
 
 def test_identify_keeps_the_fit(tmp_path):
