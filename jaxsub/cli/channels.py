@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError, nearest
-from ..recording import channels
+from ..recording import contents
 from . import terminal
 
 
 def run(log: Path, words: Sequence[str] = ()) -> None:
     """Print name, unit and number of samples of each channel of `log` whose name holds one of `words`."""
-    listed = channels(log)
+    listed, findings = contents(log)
     kept = [row for row in listed if not words or any(word.lower() in row.name.lower() for word in words)]
     if not kept:
         close = next((found for word in words if (found := nearest(word, [row.name for row in listed]))), None)
@@ -22,4 +22,6 @@ def run(log: Path, words: Sequence[str] = ()) -> None:
         for row in kept:
             terminal.say(f"{row.name:{width}}  {row.samples:>8}  {row.unit}".rstrip())
 
-    terminal.emit([row._asdict() for row in kept], show)
+    content = {"channels": [row._asdict() for row in kept], "findings": [finding.to_json() for finding in findings]}
+    terminal.emit(content, show)
+    terminal.warn(findings)

@@ -1,6 +1,6 @@
 """Recordings: one run's samples, the files they are read from and written to, and their division in time."""
 
-from jaxsub.recording.files import channels, load, save
+from jaxsub.recording.files import contents, load, save
 from jaxsub.recording.frames import from_pandas, from_xarray, to_pandas, to_xarray
 from jaxsub.recording.logs import Selection, load_log, read_selection
 from jaxsub.recording.recording import Recording
@@ -9,7 +9,7 @@ from jaxsub.recording.split import hold_out, split
 __all__ = [
     "Recording",
     "Selection",
-    "channels",
+    "contents",
     "from_pandas",
     "from_xarray",
     "hold_out",

@@ -11,8 +11,8 @@ from jaxsub.errors import InputError, OutputError
 from jaxsub.recording.archive import MARK, extracted, split_member
 from jaxsub.recording.frames import recorded, to_pandas, to_xarray
 from jaxsub.recording.layout import with_brackets
-from jaxsub.recording.logs import SUFFIXES, Channel, Selection, load_log
-from jaxsub.recording.logs import channels as log_channels
+from jaxsub.recording.logs import SUFFIXES, Channel, Listing, Selection, load_log
+from jaxsub.recording.logs import contents as contents_of_log
 from jaxsub.recording.matlab import read_matlab
 from jaxsub.recording.netcdf import read_netcdf
 from jaxsub.recording.parquet import read_parquet
@@ -51,23 +51,24 @@ def load(
         return load_log(path, columns, held=held, interpolated=interpolated)
     if columns is not None:
         raise InputError(str(path), "is no log: its headers name its columns", "leave --columns out")
-    contents, name, source = read(path)
-    return recorded(contents.table, name, source, contents.first_row, contents.findings)
+    found, name, source = read(path)
+    return recorded(found.table, name, source, found.first_row, found.findings)
 
 
-def channels(path: str | os.PathLike[str]) -> list[Channel]:
+def contents(path: str | os.PathLike[str]) -> Listing:
     """What a log or the file of a recording holds: name, unit where it states one, and number of samples.
 
-    A column that holds no numbers has no samples. Raises InputError for a file that cannot be read.
+    A column that holds no numbers has no samples. The findings say how the file was read, where that is not plain, and
+    what of an incomplete log is lost. Raises InputError for a file that cannot be read.
     """
     path = Path(path)
     if path.suffix.lower() in SUFFIXES or _is_bag(path):
-        return log_channels(path)
-    listed = []
-    for header, values in read(path)[0].table:
+        return contents_of_log(path)
+    listed, found = [], read(path)[0]
+    for header, values in found.table:
         name, unit = split_header(header)
         listed.append(Channel(name, unit or "", _measured(values)))
-    return listed
+    return Listing(listed, found.findings)
 
 
 def _measured(values: np.ndarray | InputError) -> int:
@@ -81,10 +82,10 @@ def read(path: Path) -> tuple[Contents, str, str]:
     """What the file of a recording holds, the run's name and the file as errors name it."""
     file, member = split_member(path)
     if file.suffix.lower() == ARCHIVE:
-        with extracted(file, member, _READERS) as (target, found):
-            source = f"{file}{MARK}{found}"
-            contents = _of_suffix(_READERS, target, source)(target, source)
-            return contents, PurePosixPath(found).stem if member else file.stem, source
+        with extracted(file, member, _READERS) as (target, name):
+            source = f"{file}{MARK}{name}"
+            found = _of_suffix(_READERS, target, source)(target, source)
+            return found, PurePosixPath(name).stem if member else file.stem, source
     if os.path.exists(path):
         require_file(path)  # first, so that a folder is called one and not a file without an extension
     reader = _of_suffix(_READERS, path, str(path))

@@ -44,7 +44,7 @@ def folder(tmp_path_factory):
             at, v = at + 1e-4 * v, v + 1e-4 * (2.0 * force[k] - 0.5 * v - 4.0 * at)
         x[k + 1] = at
     with (folder / "run.mcap").open("wb") as file:
-        writer = Writer(file)
+        writer = Writer(file, chunk_size=1000)  # several chunks
         writer.start()
         schema = writer.register_schema("any", "jsonschema", b"{}")
         place, command = (writer.register_channel(topic, "json", schema) for topic in ("rig", "drive"))
@@ -65,6 +65,17 @@ def test_channels_are_listed(folder, monkeypatch, capsys):
     assert [row[0] for row in listed] == ["rig.place", "drive.command"] and listed[0][1] == "200"
     code, said = ran(monkeypatch, capsys, "channels", folder / "run.mcap", "DRIVE")
     assert said.out.startswith("drive.command") and said.out.count("\n") == 1
+
+
+def test_what_a_cut_log_has_lost_is_a_warning_beside_its_channels(folder, tmp_path, monkeypatch, capsys):
+    content = (folder / "run.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(content[: 2 * len(content) // 3])
+    code, said = ran(monkeypatch, capsys, "channels", tmp_path / "cut.mcap")
+    assert code == 0 and said.err.count("\n") == 1, said.err
+    assert said.err.startswith("warning: ") and "cut.mcap: is incomplete: its records break off at byte" in said.err
+    assert [line.split()[0] for line in said.out.splitlines()] == ["rig.place", "drive.command"]
+    code, said = ran(monkeypatch, capsys, "channels", tmp_path / "cut.mcap", "--json", "--strict")
+    assert code != 0 and [f["check"] for f in json.loads(said.out)["findings"]] == ["incomplete-log"]
 
 
 def test_simulation_follows_the_log(folder, monkeypatch, capsys):

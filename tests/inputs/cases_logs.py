@@ -141,7 +141,7 @@ ULOG = b"ULog\x01\x12\x35\x01" + bytes(8) + struct.pack("<HB", 40, ord("B")) + b
 FORMAT = b"big:uint64_t timestamp;float[999999999] x;"
 LONG = struct.pack("<HB", len(FORMAT), ord("F")) + FORMAT
 DAMAGED = [
-    _raw("MCAP, a record of 2**40 bytes", "run.mcap", MAGIC + _record(1, 2**40, b"x" * 20), "cannot be read"),
+    _raw("MCAP, a record of 2**40 bytes", "run.mcap", MAGIC + _record(1, 2**40, b"x" * 20), "can be read", "break off"),
     _raw("MCAP, only its magic", "run.mcap", MAGIC, "run.mcap"),
     _raw(
         "ULog, an array of 10**9", "run.ulg", ULOG + struct.pack("<HB", len(LONG), ord("F")) + LONG, "claims an array"

@@ -52,7 +52,7 @@ def mcap_json(path: Path) -> Path:
     from mcap.writer import Writer
 
     with path.open("wb") as file:
-        writer = Writer(file)
+        writer = Writer(file, chunk_size=1000)  # several chunks
         writer.start()
         schema = writer.register_schema("any", "jsonschema", b"{}")
         topics = {
@@ -62,10 +62,9 @@ def mcap_json(path: Path) -> Path:
             "fin": [(t, {"angle": f}) for t, f in zip(FIN_TIMES, FIN, strict=True)],
         }
         keys = {topic: writer.register_channel(topic, "json", schema) for topic in topics}
-        for topic, rows in topics.items():
-            for t, row in rows:
-                now = round(t * 1e9)
-                writer.add_message(keys[topic], now, json.dumps(row).encode(), now)
+        for t, topic, row in sorted((t, topic, row) for topic, rows in topics.items() for t, row in rows):
+            now = round(t * 1e9)
+            writer.add_message(keys[topic], now, json.dumps(row).encode(), now)
         writer.finish()
     return path
 

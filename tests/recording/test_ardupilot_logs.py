@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from jaxsub.errors import InputError
-from jaxsub.recording import channels, load
+from jaxsub.recording import contents, load
 
 pytest.importorskip("pymavlink")
 
@@ -32,7 +32,7 @@ def test_telemetry_keeps_systems_apart(logs):
     np.testing.assert_allclose(run.times, flight.TIMES - flight.TIMES[0], atol=1e-5)
     np.testing.assert_allclose(run.column("r"), flight.RATE, atol=1e-7)
     assert np.max(np.abs(np.diff(run.column("psi")))) < 0.01
-    listed = {channel.name: channel for channel in channels(logs[1])}
+    listed = {channel.name: channel for channel in contents(logs[1]).channels}
     assert listed["ATTITUDE.yaw"].unit == "rad" and listed["HEARTBEAT[255.190].type"].samples == 50
     with pytest.raises(InputError, match=r"holds no channel 'HEARTBEAT.type'; did you mean 'HEARTBEAT\[1.1\].type'"):
         load(logs[1], {"x": "HEARTBEAT.type"})

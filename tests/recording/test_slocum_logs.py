@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from jaxsub.errors import InputError
-from jaxsub.recording import Selection, channels, load
+from jaxsub.recording import Selection, contents, load
 
 # looked for, not imported: workers that collect at the same moment would run into one another at the first import
 PACKAGE = find_spec("dbdreader")
@@ -64,14 +64,26 @@ def test_glider_descends_while_it_points_down(dive):
 
 
 def test_contents_have_units_and_counts(dive):
-    listed = {channel.name: channel for channel in channels(DIVE)}
+    listed = {channel.name: channel for channel in contents(DIVE).channels}
     assert listed["m_pitch"] == ("m_pitch", "rad", 1532)
     assert listed["m_de_oil_vol"].unit == "cm^3" and "m_present_time" not in listed
 
 
+@pytest.mark.parametrize("cut", [1, 5, 100_000])
+def test_file_that_its_glider_did_not_close_says_so(tmp_path, cut):
+    if not DIVE.is_file():
+        pytest.skip("this dbdreader comes without examples")
+    path = tmp_path / DIVE.name
+    path.write_bytes(DIVE.read_bytes()[:-cut])
+    lost = [[f.what for f in found if f.check == "incomplete-log"] for found in (
+        load(path, {"z": "m_depth"}).findings, contents(path).findings, contents(DIVE).findings
+    )]  # fmt: skip
+    assert lost == [["is incomplete: it lacks the mark that closes it; samples may be missing"]] * 2 + [[]]
+
+
 def test_sensor_list_that_is_missing_is_one_error():
     with pytest.raises(InputError, match="Cache file"):
-        channels(DATA / "amadeus-2014-204-05-000.dbd")
+        contents(DATA / "amadeus-2014-204-05-000.dbd")
 
 
 BESIDE = """
@@ -81,9 +93,9 @@ def made_by_another(*arguments, **options):
     os.makedirs = made
     made(*arguments, **options)
     raise FileExistsError(17, "File exists", *arguments)
-from jaxsub.recording import channels
+from jaxsub.recording import contents
 os.makedirs = made_by_another
-print(len(channels(sys.argv[1])))
+print(len(contents(sys.argv[1]).channels))
 assert os.makedirs is made
 """
 

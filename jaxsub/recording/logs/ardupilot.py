@@ -16,6 +16,7 @@ _MICRO = 1e-6
 _FORMAT = b"\xa3\x95\x80"  # the head of a message that describes others
 _DEFINITIONS = ("FMT", "FMTU", "UNIT", "MULT")
 _SHORTEST = 3  # bytes of a message: its head
+_STAMP = 8  # bytes before each message of telemetry
 _SPELT = {
     "UNKNOWN": "", "instance": "", "satellites": "", "enum": "", "bitmask": "", "deglatitude": "deg",
     "deglongitude": "deg", "degheading": "deg", "Gauss": "gauss", "mGauss": "milligauss", "us": "µs", "cm/s": "cm/s",
@@ -30,6 +31,7 @@ class DataFlash(Log):
     """
 
     def __init__(self, path: Path):
+        super().__init__()
         self._path = path
         self._package = optional("pymavlink.DFReader", "logs", str(path))
 
@@ -69,6 +71,7 @@ class DataFlash(Log):
         file: Any = kind.__new__(kind)  # to be closed also where its making fails
         try:
             kind.__init__(file, str(self._path))
+            self.losses = _losses(file)
             yield file
         finally:
             if "filehandle" in vars(file):
@@ -105,6 +108,7 @@ class Telemetry(MessageLog):
     """
 
     def __init__(self, path: Path):
+        super().__init__()
         self._path = path
         self._package = optional("pymavlink.mavutil", "logs", str(path))
         self._units: dict[str, Mapping[str, str]] = {}
@@ -151,11 +155,29 @@ class Telemetry(MessageLog):
     def _received(self) -> Iterator[tuple[str, str, Any]]:
         file = self._package.mavlogfile(str(self._path))
         try:
+            strange = file.filesize
             while (message := file.recv_msg()) is not None:
-                if message.get_type() not in ("BAD_DATA",) and not message.get_type().startswith("UNKNOWN"):
-                    yield message.get_type(), f"{message.get_srcSystem()}.{message.get_srcComponent()}", message
+                kind = message.get_type()
+                if kind == "BAD_DATA":
+                    continue
+                strange -= _STAMP + len(message.get_msgbuf())
+                if not kind.startswith("UNKNOWN"):
+                    yield kind, f"{message.get_srcSystem()}.{message.get_srcComponent()}", message
+            self.losses = [f"{strange} of its {file.filesize} bytes are no message"] if strange else []
         finally:
             file.close()
+
+
+def _losses(file: Any) -> list[str]:
+    """Bytes of a dataflash log, as its index has it, that belong to no message, and a last message that is cut.
+
+    What follows the last message is no loss unless it begins like one: such logs are written in pages.
+    """
+    messages = [(places, file.formats[kind].len) for kind, places in enumerate(file.offsets) if len(places)]
+    end = max((int(places[-1]) + length for places, length in messages), default=0)
+    losses = [f"{stray} of its bytes are no message"] if (stray := end - sum(len(p) * n for p, n in messages)) else []
+    cut = end > file.data_len or file.data_map[end : end + 1] == _FORMAT[:1]
+    return [*losses, "it ends within a message"] if cut else losses
 
 
 def _fields(fmt: Any) -> list[str]:

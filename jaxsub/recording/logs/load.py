@@ -1,18 +1,20 @@
 """A log of any kind, by its suffix, as a list of channels or as a recording."""
 
+import contextlib
 import dataclasses
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import InputError
+from ...findings import Finding
 from ...units import TIME, UnknownUnit, column_unit, si_unit, split_header, to_si
 from ..reading import note, reading, require_file
 from ..recording import Recording
 from .ardupilot import DataFlash, Telemetry
-from .log import Channel, Log, Series, taken
+from .log import Listing, Log, Series, taken
 from .mcap import McapLog
 from .merge import merged
 from .printed import printed
@@ -29,16 +31,16 @@ SUFFIXES = tuple(_KINDS)
 _AXES = ("yaw", "pitch", "roll")
 
 
-def channels(path: str | os.PathLike[str]) -> list[Channel]:
+def contents(path: str | os.PathLike[str]) -> Listing:
     """What a log holds: each channel's name, unit where the log states one, and number of samples.
 
-    The kinds are PX4's .ulg, ArduPilot's .bin and .tlog, .mcap, .bag, .db3, a ROS 2 bag's folder, and Slocum's .dbd,
-    .ebd, .sbd, .tbd, .mbd, .nbd.
-    Raises InputError for a file that cannot be read, or whose reader (`pip install 'jaxsub[logs]'`) is not installed.
+    Where the log is incomplete, a warning in the findings says what is lost. The kinds are PX4's .ulg, ArduPilot's
+    .bin and .tlog, .mcap, .bag, .db3, a ROS 2 bag's folder, and Slocum's .dbd, .ebd, .sbd, .tbd, .mbd, .nbd. Raises
+    InputError for a file that cannot be read, or whose reader (`pip install 'jaxsub[logs]'`) is not installed.
     """
-    path = Path(path)
-    with printed(str(path)), reading(str(path), "a log"):
-        return opened(path).channels()
+    with _read(Path(path)) as (log, findings):
+        listed = log.channels()
+    return Listing(listed, tuple(findings))
 
 
 def load_log(
@@ -51,15 +53,14 @@ def load_log(
     """The columns of `selection` as one recording, named after the log.
 
     `held` columns are held between their samples and `interpolated` ones are joined by lines, as a vehicle takes its
-    inputs and its prescribed motions; `merged` says how the rest finds its rows. What its reader reports of damage is a
+    inputs and its prescribed motions; `merged` says how the rest finds its rows. What of the log is lost is a
     warning in the recording's findings. Raises InputError for a channel that the log does not hold, a unit that is
     none, and all that a recording is refused for.
     """
     path = Path(path)
     chosen = selection if isinstance(selection, Selection) else Selection(selection)
     terms = {header: chosen.term(header) for header in chosen.columns}
-    with printed(str(path)) as findings, reading(str(path), "a log"):
-        log = opened(path)
+    with _read(path) as (log, findings):
         found = taken(log, str(path), sorted({t.channel for t in terms.values() if t.function not in _AXES}))
         turned = {c: _attitude(log, path, c) for c in {t.channel for t in terms.values() if t.function in _AXES}}
     columns: dict[str, Series] = {}
@@ -88,6 +89,18 @@ def opened(path: Path) -> Log:
     if kind is None:
         raise InputError(str(path), f"unknown extension {path.suffix!r}", f"logs are {', '.join(SUFFIXES)}")
     return kind(path)
+
+
+@contextlib.contextmanager
+def _read(path: Path) -> Iterator[tuple[Log, list[Finding]]]:
+    """The log at `path` and, once it has been read, a warning where it is incomplete."""
+    findings: list[Finding] = []
+    with printed() as said, reading(str(path), "a log"):
+        log = opened(path)
+        yield log, findings
+    if lost := [*log.losses, *said]:
+        what = f"is incomplete: {'; '.join(lost)}; samples may be missing"
+        findings.append(Finding("incomplete-log", "warning", str(path), what, "check that it was copied whole"))
 
 
 def _column(where: str, name: str, series: Series, term: Term, unit: str | None) -> Series:

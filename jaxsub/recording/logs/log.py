@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import InputError, nearest
+from ...findings import Finding
 
 
 class Channel(NamedTuple):
@@ -16,6 +17,13 @@ class Channel(NamedTuple):
     name: str
     unit: str
     samples: int
+
+
+class Listing(NamedTuple):
+    """The channels of a file in its own order, and what was found in reading it."""
+
+    channels: list[Channel]
+    findings: tuple[Finding, ...] = ()
 
 
 class Series(NamedTuple):
@@ -27,7 +35,14 @@ class Series(NamedTuple):
 
 
 class Log(abc.ABC):
-    """A file or folder of channels by name, such as `vehicle_attitude.q[0]` or `/imu.angular_velocity.z`."""
+    """A file or folder of channels by name, such as `vehicle_attitude.q[0]` or `/imu.angular_velocity.z`.
+
+    Once it has been read, `losses` says in what the file itself shows to be incomplete: each entry the predicate of a
+    sentence about it. What its package prints of that is not among them.
+    """
+
+    def __init__(self) -> None:
+        self.losses: list[str] = []
 
     @abc.abstractmethod
     def channels(self) -> list[Channel]:
@@ -50,7 +65,7 @@ class MessageLog(Log):
 
     @abc.abstractmethod
     def messages(self, topics: list[str]) -> Iterator[tuple[str, float, Any]]:
-        """Topic, time of logging (s) and content of each message of those topics, in order of time."""
+        """Topic, time of logging (s) and content of each message of those topics, in the log's order."""
 
     def channels(self) -> list[Channel]:
         """Every number of the first message of each topic."""
@@ -76,7 +91,7 @@ class MessageLog(Log):
             for name, keys in of[topic]:
                 if (value := _number(_at(message, keys))) is not None:
                     samples.setdefault(name, []).append((time, value))
-        return {name: Series(*np.array(pairs).T) for name, pairs in samples.items()}
+        return {name: _in_order(np.array(pairs)) for name, pairs in samples.items()}
 
 
 def taken(log: Log, source: str, names: list[str]) -> dict[str, Series]:
@@ -90,6 +105,11 @@ def taken(log: Log, source: str, names: list[str]) -> dict[str, Series]:
                 remedy += "; in arithmetic, set blanks around + - /"
             raise InputError(source, f"holds no channel {name!r}", remedy)
     return found
+
+
+def _in_order(pairs: np.ndarray) -> Series:
+    """Rows of time and value in order of time; of equal times in the log's."""
+    return Series(*pairs[np.argsort(pairs[:, 0], kind="stable")].T)
 
 
 def _keys(path: str) -> list[str | int]:

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from typing import IO
 
 from ...errors import InputError
-from ...findings import Finding
 
 # the streams are the process's: two threads would hand each other's back
 _ONE_AT_A_TIME = threading.Lock()
@@ -17,24 +16,23 @@ _SHOWN = 120  # characters of the first line
 
 
 @contextlib.contextmanager
-def printed(source: str) -> Iterator[list[Finding]]:
-    """Once the block has ended, a warning that the log `source` is damaged, where its reader has printed anything.
+def printed() -> Iterator[list[str]]:
+    """Once the block has ended, what a log's reader has printed, as the end of a sentence: one text, or none.
 
     What it prints, on standard output or error, goes nowhere else; an `InputError` of the block says it too.
     """
-    findings: list[Finding] = []
+    texts: list[str] = []
     with _ONE_AT_A_TIME, tempfile.TemporaryFile("w+", errors="replace") as file:
         try:
             with _turned_away(file), contextlib.redirect_stdout(file), contextlib.redirect_stderr(file):
-                yield findings
+                yield texts
         except InputError as error:
             where, what, remedy = error.parts
             if not (said := _said(file)):
                 raise
             raise type(error)(where, f"{what}; {said}", remedy) from error
         if said := _said(file):
-            what = f"is damaged: {said}; samples there are missing"
-            findings.append(Finding("damaged-log", "warning", source, what, "check that it was copied whole"))
+            texts.append(said)
 
 
 @contextlib.contextmanager

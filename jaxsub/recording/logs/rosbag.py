@@ -14,6 +14,7 @@ class RosBag(MessageLog):
     """Messages whose definitions the bag does not carry are taken for those of ROS 2 Humble."""
 
     def __init__(self, path: Path):
+        super().__init__()
         types = optional("rosbags.typesys", "logs", str(path))
         self._reader = optional("rosbags.highlevel", "logs", str(path)).AnyReader
         self._open = lambda: self._reader([path], default_typestore=types.get_typestore(types.Stores.ROS2_HUMBLE))

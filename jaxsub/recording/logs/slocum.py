@@ -22,6 +22,7 @@ _SPELT = {
 }  # fmt: skip
 _HEADER = 4096  # bytes in which it stands
 _TAGS, _SENSORS = 100, 50_000  # a glider has 14 and 1400
+_END = b"X"
 _CLOCKS = ("m_present_time", "sci_m_present_time")
 
 
@@ -33,6 +34,7 @@ class SlocumLog(Log):
     """
 
     def __init__(self, path: Path):
+        super().__init__()
         self._path = path
         self._package = _dbdreader(str(path))
 
@@ -71,10 +73,20 @@ class SlocumLog(Log):
         # the package leaves cache files of its own in the folder that it is given
         with tempfile.TemporaryDirectory(prefix="jaxsub-") as scratch:
             file = self._package.DBD(str(self._path), cacheDir=str(folder or scratch))
+            self.losses = ["it lacks the mark that closes it"] * (not self._is_closed())
             try:
                 yield file
             finally:
                 file.close()
+
+    def _is_closed(self) -> bool:
+        """Whether the last byte is the mark that a glider writes when it closes a file."""
+        packed = self._package.decompress
+        if packed.is_compressed(str(self._path)):
+            content = packed.Decompressor(str(self._path)).decompress()
+        else:
+            content = self._path.read_bytes()
+        return bool(content.rstrip().endswith(_END))
 
 
 def _unit(file: Any, name: str) -> str:

@@ -1,5 +1,6 @@
 """PX4's ULog (.ulg), read by pyulog."""
 
+import io
 import re
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,25 @@ from ...errors import InputError, optional
 from .log import Channel, Log, Series
 
 _MICRO = 1e-6  # its stamps are in µs
+_HEAD = 3  # bytes of a message: its length and kind
 _LONGEST = 2**16  # bytes of a message
 _DEFINITIONS = 2**22  # bytes of a log in which its formats stand
+
+
+class _Counted(io.BufferedReader):
+    """A file that knows, once it has been read, whether it ended within a message."""
+
+    ends_within = False
+
+    def __init__(self, path: Path):
+        super().__init__(io.FileIO(path))
+
+    def read(self, size: int | None = -1) -> bytes:
+        """The next `size` bytes. At the end of a whole file the reader asks for a message's head and gets nothing."""
+        data = super().read(size)
+        asked = size or 0
+        self.ends_within = 0 < len(data) < asked or (not data and asked > _HEAD)
+        return data
 
 
 class ULog(Log):
@@ -22,6 +40,7 @@ class ULog(Log):
     """
 
     def __init__(self, path: Path):
+        super().__init__()
         self._path = path
         self._package = optional("pyulog", "logs", str(path))
 
@@ -45,10 +64,14 @@ class ULog(Log):
         return found
 
     def _read(self, topics: list[str] | None) -> Any:
-        with self._path.open("rb") as file:
+        with _Counted(self._path) as file:
             self._check(file.read(_DEFINITIONS))
             file.seek(0)
-            return self._package.ULog(file, topics)
+            log = self._package.ULog(file, topics)
+        self.losses = ["it ends within a message"] * file.ends_within
+        if dropouts := [1e-3 * dropout.duration for dropout in log.dropouts]:
+            self.losses.append(f"its logger dropped messages {len(dropouts)} times, {sum(dropouts):.3g} s in all")
+        return log
 
     def _check(self, head: bytes) -> None:
         """Raise InputError for an array longer than a message can be, whose parts the reader would name one by one."""
