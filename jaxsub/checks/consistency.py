@@ -23,12 +23,13 @@ def consistency(recording: Recording, layout: Layout, columns: Mapping[str, np.n
     agree best is named, then the next. A fault counts if it makes the data more likely by a factor of e³⁰ than none.
     """
     body = layout.kind == "submerged-body"
-    rows = _rows(len(recording.times))
-    motions = Motions.of(layout, {name: values[rows] for name, values in columns.items()}, speed)
+    motions = Motions.of(layout, columns, speed)
     if len(motions.columns) < 2:
         return []
     relations = body_relations(motions) if body else mechanism_relations(layout, motions)
-    search = Search(recording.times[rows], motions, relations, layout.length or _REACH)
+    rows = _rows(len(recording.times))
+    looked_at = motions.replaced({name: values[rows] for name, values in motions.columns.items()})
+    search = Search(recording.times[rows], looked_at, relations, layout.length or _REACH)
     findings, told, named = [], set(), set()
     for _ in range(_MOST):
         best = search.best(named)

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from .increments import longest_step
 from .relations import Relation
 
 Kind = Literal["sign", "factor", "axis", "delay", "clock", "drift"]
@@ -91,11 +92,12 @@ def known_factor(angular: bool, factor: float, near: float) -> str:
 
 
 def _at(times: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
-    """The sample of `values` nearest to each other time, NaN outside of the run.
+    """The sample of `values` nearest to each other time, NaN in holes and outside of the run.
 
     To interpolate would average noise, and so make channels agree better at any delay between samples.
     """
     before = np.clip(np.searchsorted(times, when, side="right") - 1, 0, times.size - 2)
     nearest = before + (when - times[before] > times[before + 1] - when)
-    interval = 0.5 * float(np.median(np.diff(times)))
-    return np.where((when >= times[0] - interval) & (when <= times[-1] + interval), values[nearest], np.nan)
+    steps, interval = np.diff(times), 0.5 * float(np.median(np.diff(times)))
+    reach = np.where(steps > longest_step(times), interval, np.maximum(0.5 * steps, interval))
+    return np.where(np.abs(when - times[nearest]) <= reach[before] * (1.0 + 1e-9), values[nearest], np.nan)

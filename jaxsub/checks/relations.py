@@ -131,14 +131,16 @@ def _position(motions: Motions) -> list[Relation]:
 
         others = ("u", "v", "w", "phi", "theta", "psi") if row < 2 else ("u", "v", "w", "phi", "theta")
         among, exact = _among(motions, channel, *others), motions.knows(*others)
-        arms = lambda m, row=row: np.array(_axes(m, row))
+        arms = lambda m, row=row, channel=channel: np.array(np.broadcast_arrays(*_axes(m, row), m[channel])[:3])
         found.append(Relation(channel, formula, rate, among, False, exact, arms, offset))
     return found
 
 
 def _axes(motions: Motions, row: int) -> list[np.ndarray]:
     """The components of the body's axes along x, y or z of the earth: a row of the rotation matrix."""
-    (sf, st, sp), (cf, ct, cp) = ([f(motions[name]) for name in _EULER] for f in (np.sin, np.cos))
+    # one number for an angle that is locked: a search compares hundreds of times
+    angles = [motions.columns.get(name, np.float64(motions.constants.get(name, 0.0))) for name in _EULER]
+    (sf, st, sp), (cf, ct, cp) = ([f(angle) for angle in angles] for f in (np.sin, np.cos))
     rows = (
         lambda: [cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf],
         lambda: [sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf],

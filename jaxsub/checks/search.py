@@ -82,7 +82,7 @@ class Search:
         values, rate = self._sides(relation, self._motions)
         interval = float(np.median(np.diff(self._times)))
         # white noise of both sides, integrated over as many samples as a window has
-        noise = 2.0 * white(values) + plain.durations * interval * white(rate)
+        noise = 2.0 * white(self._times, values) + plain.durations * interval * white(self._times, rate)
         signal = np.maximum(plain.changes, plain.integrals) ** 2
         clear = (signal > _ABOVE * noise) & (plain.independent > _INDEPENDENT)
         return plain if clear.any() and float(np.min(plain.distances[clear])) > UNLIKE else None
