@@ -10,6 +10,8 @@ from ..parameters import Parameter
 from ..units import UnknownUnit, is_si, same_dimension, si_unit
 from .base import Output
 
+# and its inverse the smallest: what a model makes of several such numbers is a float still
+_LARGEST = 1e60
 _NUMBER_KEYS = ("value", "fixed", "free", "bounds", "prior_std", "prior_mean", "unit")
 _ACCELEROMETER = ("ax", "ay", "az")
 
@@ -158,6 +160,9 @@ def read_option(table: Table, key: str, field: dataclasses.Field) -> Any:
 def _finite(value: Any, place: str) -> float:
     if not math.isfinite(number := _real(value)):
         raise InputError(place, f"{value!r:.60} is not a finite number", "give a number in SI units")
+    if number and not 1.0 / _LARGEST <= abs(number) <= _LARGEST:
+        what = f"is {number:.3g}, and sizes from {1.0 / _LARGEST:g} to {_LARGEST:g} can be computed with"
+        raise InputError(place, what, "give a number in SI units")
     return number
 
 
