@@ -88,13 +88,12 @@ def compared(
 ) -> Comparison | None:
     """Compare `values` (samples,), NaN where missing, with the integral of `rate` (samples,); None without windows.
 
-    `arms` (3, samples) times a lever arm of up to `reach` (m) along each axis may be added to `values`, and a mean of
-    up to `offset` or 0.3 times the rms of the rate to `rate`.
+    `arms` (arms, samples) times a number of up to `reach` each, a lever arm or an angle of mounting, may be added to
+    `values`, and a mean of up to `offset` or 0.3 times the rms of the rate to `rate`.
     """
     if not windows.ends:
         return None
-    level = np.nan_to_num(rate)
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (level[1:] + level[:-1]) * np.diff(times))])
+    integral = integrated(times, rate)
     known = np.isfinite(values) & np.isfinite(rate)
     found = np.full((8, len(windows.ends)), np.nan)
     noises = white(times, values), white(times, rate) * float(np.median(np.diff(times)))
@@ -114,6 +113,13 @@ def compared(
         if found.size
         else None
     )
+
+
+def integrated(times: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """The integrals of `rates` (..., samples) over time from the first sample, zero where a rate is missing."""
+    levels = np.nan_to_num(rates)
+    steps = 0.5 * (levels[..., 1:] + levels[..., :-1]) * np.diff(times)
+    return np.concatenate([np.zeros((*levels.shape[:-1], 1)), np.cumsum(steps, axis=-1)], axis=-1)
 
 
 def longest_step(times: np.ndarray) -> float:
@@ -147,7 +153,7 @@ def _window(
         drift = float(duration @ difference) / float(duration @ duration)
         rest, armed = difference - min(max(drift, -slack), slack) * duration, np.zeros(count)
     else:
-        limits = np.array([slack, reach, reach, reach])
+        limits = np.array([slack, *[reach] * len(arms)])
         numbers = _within(np.vstack([duration, arms]), difference, limits)
         armed = numbers[1:] @ arms
         rest = difference - numbers[0] * duration - armed

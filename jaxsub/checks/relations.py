@@ -65,6 +65,8 @@ class Relation:
     - `direct`: whether `partner` is a single channel. `exact`: whether every term is measured or at rest.
     - `arms`: gives what a sensor 1 m off the origin along each body axis adds to `channel`, (3, samples); None for
       angles and their rates, which have no arm.
+    - `leaks`: gives the rates (rates, samples) of which a gyro that is mounted 1 rad askew adds to this one; None where
+      they are not measured.
     - `offset`: the largest mean of the rate (unit of `channel` a second) that is no fault, such as a current's; that
       of a direct relation is a share of the rate itself.
     """
@@ -77,6 +79,7 @@ class Relation:
     exact: bool
     arms: Callable[[Motions], np.ndarray] | None = None
     offset: float = 0.0
+    leaks: Callable[[Motions], np.ndarray] | None = None
 
 
 def body_relations(motions: Motions) -> list[Relation]:
@@ -98,6 +101,10 @@ def _attitude(motions: Motions) -> list[Relation]:
     def turning(m: Motions) -> np.ndarray:
         return (m["q"] * np.sin(m["phi"]) + m["r"] * np.cos(m["phi"])) / _away_from_zero(np.cos(m["theta"]))
 
+    def leaking(*names: str) -> Callable[[Motions], np.ndarray] | None:
+        there = [name for name in names if name in motions.columns]
+        return (lambda m: np.array([m[name] for name in there])) if there else None
+
     rates = {
         "psi": ("r", turning, ("phi", "theta", "q")),
         "theta": ("q", lambda m: m["q"] * np.cos(m["phi"]) - m["r"] * np.sin(m["phi"]), ("phi", "r")),
@@ -105,7 +112,15 @@ def _attitude(motions: Motions) -> list[Relation]:
     }
     return [
         # what is not known is taken as zero, and then less is concluded
-        Relation(channel, partner, rate, _among(motions, channel, partner, *others), True, motions.knows(*others))
+        Relation(
+            channel,
+            partner,
+            rate,
+            _among(motions, channel, partner, *others),
+            True,
+            motions.knows(*others),
+            leaks=leaking(*{"p", "q", "r"} - {partner}),
+        )
         for channel, (partner, rate, others) in rates.items()
         if {channel, partner} <= set(motions.columns) and _counted(motions[channel])
     ]

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from .explanations import UNLIKE
-from .increments import Comparison, Windows, compared, filled, white
+from .increments import Comparison, Windows, compared, filled, integrated, white
 from .mends import ANGLES, Kind, Mend, gross, is_angular, known_factor, late
 from .relations import Motions, Relation
 
@@ -15,6 +15,7 @@ _SURE = 30.0  # log likelihood ratio of a fault, less what it costs
 # what is free to take any value explains more by chance, and is less likely before the data than a unit that is known
 _COST = {"sign": 0.0, "axis": 2.0, "factor": 4.0, "delay": 8.0, "drift": 8.0, "clock": 16.0}
 _FREE = 8.0  # of a factor between no units that are known
+_SCALE = 0.5e-6  # distance of sides that differ by a scale error of 0.1 %, below which nothing is explained
 _AGREED = 0.3  # distance between a channel and its rate, beyond which a mend is none
 _BAD = 0.004  # distance below which no factor is looked for
 _ARMED = 0.1  # distance of sides with lever arms below which no factor is named
@@ -23,6 +24,7 @@ _APART = 0.35  # distance below which channels with terms that are not known do 
 _LEFT = {"sign": 0.5, "axis": 0.5, "factor": 0.5, "delay": 0.7, "clock": 0.6, "drift": 0.7}
 _KNOWN_ONLY = 0.05  # distance that a factor of a formula leaves, beyond which only a known factor is named
 _FACTOR, _ROUGH = 1.15, 1.5  # factors that are none, where every term is known and where one is not
+_ASKEW = 0.1  # rad: of the mounting of a gyro
 _DRIFT = 0.3  # of the rate's rms
 _ABOVE = 100.0  # times the variance of white noise
 _INDEPENDENT = 2.5  # differences: a heading that wanders has few
@@ -42,6 +44,7 @@ class Search:
         )
         self._windows = [self._windows_of(relation) for relation in relations]
         self._few = [windows.few for windows in self._windows]
+        self._inside: dict[tuple[int, bool, Kind, float], Comparison | None] = {}
         pairs = [(self._windows, False), (self._few, True)]
         self._plain = {
             (i, few): self._compared(relation, None, windows[i])
@@ -140,28 +143,47 @@ class Search:
         """The log likelihood ratio of a fault over all relations and where it is largest; None if it mends nothing."""
         total, top = 0.0, None
         for index, relation in enumerate(self._relations):
-            plain = self._plain[index, loose]
-            if plain is None or relation.among.isdisjoint(mend.channels):
+            if relation.among.isdisjoint(mend.channels):
                 continue
             # a delay of all that takes part changes nothing
             if mend.kind in ("delay", "clock") and (not relation.exact or relation.among <= {*mend.channels}):
+                continue
+            plain = self._plain_beside(mend, index, loose)
+            if plain is None:
                 continue
             found = self._compared(relation, mend, (self._few if loose else self._windows)[index])
             if found is None:
                 continue
             # residual noise is white after the right mend, and coloured by the fault before
             count = np.sqrt(plain.independent * found.independent)
-            ratios = np.where(plain.clear & found.clear, -count * np.log(_left(mend, plain, found)), np.nan)
+            counts = plain.clear & found.clear & (plain.distances > _SCALE)
+            ratios = np.where(counts, -count * np.log(_left(mend, plain, found)), np.nan)
             if not np.isfinite(ratios).any():
                 continue
             at = int(np.nanargmax(np.abs(ratios)))
             total += float(ratios[at])
-            if top is None or ratios[at] > top[0]:
+            # the mean of a rate shows in the channel whose rate it is, whatever else it explains
+            names = mend.kind != "drift" or relation.partner == mend.channels[0]
+            if names and (top is None or ratios[at] > top[0]):
                 top = float(ratios[at]), relation, plain, found, at
         if top is None:
             return None
         _, relation, plain, found, at = top
         return (total, relation) if loose or self._mends(mend, relation, plain, found, at) else None
+
+    def _plain_beside(self, mend: Mend, index: int, loose: bool) -> Comparison | None:
+        """The comparison of a relation without `mend`, in the windows in which it can be made with it.
+
+        A delay leaves the ends of a run unknown; a window there, a start from rest, would count for any delay.
+        """
+        if mend.kind not in ("delay", "clock"):
+            return self._plain[index, loose]
+        key = (index, loose, mend.kind, mend.amount)
+        if key not in self._inside:
+            nothing = dataclasses.replace(mend, channels=("",)).undone(self._times, {"": np.zeros(self._times.size)})
+            windows = (self._few if loose else self._windows)[index]
+            self._inside[key] = self._compared(self._relations[index], None, windows, nothing[""])
+        return self._inside[key]
 
     def _mends(self, mend: Mend, relation: Relation, plain: Comparison, found: Comparison, at: int) -> bool:
         """Whether sides that were apart agree, and by more than what may be."""
@@ -203,13 +225,20 @@ class Search:
     def _windows_of(self, relation: Relation) -> Windows:
         return Windows.of(self._times, *self._sides(relation, self._motions))
 
-    def _compared(self, relation: Relation, mend: Mend | None, windows: Windows) -> Comparison | None:
+    def _compared(
+        self, relation: Relation, mend: Mend | None, windows: Windows, nothing: np.ndarray | float = 0.0
+    ) -> Comparison | None:
+        """A relation with `mend`, or without; `nothing` (samples,) is NaN where samples shall not count, else 0."""
         motions = (
             self._motions if mend is None else self._motions.replaced(mend.undone(self._times, self._motions.columns))
         )
-        arms = None if relation.arms is None else relation.arms(motions)
-        sides = self._sides(relation, motions)
-        return compared(self._times, *sides, windows, arms, self._reach, relation.offset)
+        arms, limit = None, self._reach
+        if relation.arms is not None:
+            arms = relation.arms(motions)
+        elif relation.leaks is not None:
+            arms, limit = integrated(self._times, relation.leaks(motions)), _ASKEW
+        values, rate = self._sides(relation, motions)
+        return compared(self._times, values + nothing, rate + nothing, windows, arms, limit, relation.offset)
 
 
 def _left(mend: Mend, plain: Comparison, found: Comparison) -> np.ndarray:
