@@ -19,7 +19,8 @@ import numpy as np
 from jaxtyping import Array
 from scipy import stats
 
-from jaxsub.discrepancy.process_noise import ALARM_RATE, Above, calibrated, noise_densities, noise_filter
+from jaxsub.discrepancy.process_noise import Above, calibrated, noise_densities, noise_filter
+from jaxsub.discrepancy.settings import LEVEL
 from jaxsub.effects import (
     VELOCITIES,
     AbstractForce,
@@ -191,7 +192,7 @@ def false_alarm(density: np.ndarray) -> dict:
     tests = (len(density) - _COPIES) * density.shape[1]
     interval = stats.binomtest(alarms, tests).proportion_ci(0.95)
     return {
-        "stated": ALARM_RATE,
+        "stated": LEVEL,
         "rate": alarms / tests,
         "of": tests,
         "interval": [float(interval.low), float(interval.high)],

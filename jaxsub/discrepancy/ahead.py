@@ -18,19 +18,16 @@ from ..estimate import Ended, evaluate, initial_guess
 from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import SUCCESSFUL
 from ..vehicle import AbstractVehicle
-from .cross_validation import LONG_BLOCKS, Comparison, compare, one_step_ahead, simulated
+from .cross_validation import Comparison, compare, one_step_ahead, simulated
 from .evidence import evidence_of
 from .model import freed, joined, places
 from .programs import make_room
 from .restarts import restarted, starts
 from .selector import Selector
+from .settings import BLOCKS, FEWEST_SAMPLES, MOST_RESTARTS, RESTART_ERROR
 from .stiffness import substeps_for
 from .trial import Model, Trial, fitted_model
 from .view import View, led_from, look
-
-# the most pieces into which a run is cut, the fewest samples of one, and of what was measured, the share of variance
-# that a free run may leave
-_PIECES, _FEWEST, _LEFT = 64, 8, 0.1
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,10 +137,10 @@ def pieces_of(view: View) -> int | None:
     runs, measured = view.runs, [view.measured(channel) for channel in view.vehicle.layout.channels]
     variance = np.array([np.var(values) if len(values) else np.inf for values in measured])
     pieces = 1
-    while pieces <= min(_PIECES, runs.times.shape[1] // _FEWEST):
+    while pieces <= min(MOST_RESTARTS, runs.times.shape[1] // FEWEST_SAMPLES):
         shown = restarted(view.vehicle, view.followed, runs, pieces)
         rms = concentrated_sigma(residual_outputs(view.vehicle, runs, shown), runs)
-        if np.all(np.asarray(rms**2 - view.sigma**2) < _LEFT * variance):
+        if np.all(np.asarray(rms**2 - view.sigma**2) < RESTART_ERROR * variance):
             return pieces
         pieces *= 2
     return None
@@ -154,6 +151,6 @@ def in_pieces(model: Model, pieces: int) -> Model:
     view = model.view
     runs, start = view.runs.segments(pieces), starts(view.followed, pieces)
     ended = Ended(view.vehicle, runs, start, view.sigma, model.fit.cost, model.fit.steps, SUCCESSFUL)
-    blocks = max(1, LONG_BLOCKS // pieces)
+    blocks = max(1, BLOCKS // pieces)
     predicted = model.predicted._replace(simulation=simulated(evaluate(ended), blocks, known_start=True))
     return Model(ended, view, predicted, model.added, pieces)

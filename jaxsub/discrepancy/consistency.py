@@ -14,12 +14,9 @@ from jaxtyping import Float
 from ..estimate.assessment import Assessment, assess_residuals
 from ..recording import Recording
 from .diagnosis import ChannelQuality, Explained, Remainder
+from .settings import LARGE_ERROR, LISTED
 from .validation import stacked_columns
 from .verdict import Judged
-
-# rms/σ: a test run's error is far above its noise where its 95 % interval lies above, which no `none` may leave
-FAR = 2.0
-_SHOWN = 4
 
 
 def compared(
@@ -63,7 +60,8 @@ def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder
     `remains` is what the last model leaves of each channel there and `assessment` the tests of it, of which the one of
     size then has the mismatch's p-value.
     """
-    far = {channel: rms for channel, rms in found.left.items() if remains[channel].low > FAR}
+    # the 95 % interval of a channel's error lies far above its noise, which no `none` may leave
+    far = {channel: rms for channel, rms in found.left.items() if remains[channel].low > LARGE_ERROR}
     if judged.verdict != "none" or (found.improved_runs and not far):
         return judged
     large = f"Simulation error on the test runs is {sigmas(far)}"
@@ -76,5 +74,5 @@ def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder
 def sigmas(rms: Mapping[str, float]) -> str:
     """`1.4 σ in psi, 1.2 σ in r`, the largest first."""
     ranked = sorted(rms.items(), key=lambda item: -item[1])
-    more = f" and more than noise in {len(ranked) - _SHOWN} others" if len(ranked) > _SHOWN else ""
-    return ", ".join(f"{value:.3g} σ in {channel}" for channel, value in ranked[:_SHOWN]) + more
+    more = f" and more than noise in {len(ranked) - LISTED} others" if len(ranked) > LISTED else ""
+    return ", ".join(f"{value:.3g} σ in {channel}" for channel, value in ranked[:LISTED]) + more

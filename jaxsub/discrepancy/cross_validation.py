@@ -21,13 +21,8 @@ from scipy import special
 
 from ..estimate import Fit, Problem
 from .evidence import conditional
+from .settings import BLOCKS, BLOCKS_ONE_STEP, LEVEL
 from .view import View
-
-# level at which one model is called better or worse than another
-LEVEL = 0.05
-# blocks of each run one step ahead, and of simulation errors, which are correlated for longer
-_SHORT_BLOCKS, LONG_BLOCKS = 24, 4
-_TINY = 1e-300
 
 
 class Predicted(NamedTuple):
@@ -78,7 +73,7 @@ class Comparison(NamedTuple):
 def compare(before: Predicted, after: Predicted, admissible: bool = True) -> Comparison:
     """What a model `after` gains over one `before` that has less in it."""
     squares = lambda one: -2.0 * float(np.sum(one.simulation))
-    ratio = squares(after) / max(squares(before), _TINY) if np.isfinite(squares(before)) else 0.0
+    ratio = squares(after) / max(squares(before), 1e-300) if np.isfinite(squares(before)) else 0.0
     one_step, simulation = (gain(b, a) for b, a in zip(before, after, strict=True))
     return Comparison(one_step, simulation, ratio, admissible)
 
@@ -97,13 +92,13 @@ def gain(before: Float[np.ndarray, " n"], after: Float[np.ndarray, " n"]) -> Gai
     total = float(np.sum(difference))
     if n < 2 or total == 0.0:
         return Gain(total, 1.0, 1.0)
-    t = total / max(float(np.std(difference, ddof=1)) * np.sqrt(n), _TINY)
+    t = total / max(float(np.std(difference, ddof=1)) * np.sqrt(n), 1e-300)
     return Gain(total, float(special.stdtr(n - 1, -t)), float(special.stdtr(n - 1, t)))
 
 
 def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     """`Predicted.one_step` of a view's vehicle under the view's disturbance."""
-    products, logarithms = view.products(view.base, view.disturbance, _SHORT_BLOCKS)
+    products, logarithms = view.products(view.base, view.disturbance, BLOCKS_ONE_STEP)
     # what lies beyond the end of a short run has nothing
     there = (logarithms != 0.0) | np.any(products != 0.0, axis=(1, 2))
     products, logarithms = products[there], logarithms[there]
@@ -113,7 +108,7 @@ def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     return conditional(gram, products, logarithms)
 
 
-def simulated(fit: Fit, blocks: int = LONG_BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
+def simulated(fit: Fit, blocks: int = BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
     """`Predicted.simulation` of a fit, in so many `blocks` a run; the initial states may be `known_start`."""
     products = _simulation_products(fit, blocks)
     if not np.all(np.isfinite(products)):
@@ -148,7 +143,7 @@ def _prior_pull(problem: Problem) -> Float[np.ndarray, " p"]:
 
 def _left(others: Float[np.ndarray, "q q"], block: Float[np.ndarray, "q q"]) -> float:
     """The squares that a block has at the numbers of the `others`."""
-    size = np.sqrt(np.maximum(np.diag(others)[1:], _TINY))
+    size = np.sqrt(np.maximum(np.diag(others)[1:], 1e-300))
     unit = others[1:, 1:] / np.outer(size, size)
     step = np.linalg.lstsq(unit, others[1:, 0] / size, rcond=1e-12)[0] / size
     at = np.concatenate([[1.0], -step])

@@ -26,6 +26,7 @@ from .model import allowing_for
 from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress, limited
+from .settings import LISTED, REPORTED_DISTURBANCE, RIVALS_FITTED
 from .show import channel_quality, coefficients, estimates, run_quality, trades
 from .stand_in import described
 from .summary import summary
@@ -33,11 +34,6 @@ from .trial import Found, Model, Trial, fitted_model
 from .validation import beyond_noise, remainders
 from .verdict import Judged
 from .view import View, look
-
-# that a next manoeuvre is to tell from what was named
-_RIVALS = 2
-# and how many a page lists: the rest are less likely still
-_SHOWN = 4
 
 
 def diagnose(
@@ -184,14 +180,14 @@ def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVe
         return ()
     least = min(judged.named, key=lambda named: named.probability)
     without = improved.without_effect(least.effect.label)
-    rivals = [rival for rival, _ in least.rivals[:_RIVALS]]
+    rivals = [rival for rival, _ in least.rivals[:RIVALS_FITTED]]
     return (improved, *(without.with_effect(rival) for rival in rivals))
 
 
 def _physics(named: Named, improved: Fit) -> Physics:
     """An accepted effect with its numbers from the final fit."""
     effect = next((e for e in improved.vehicle.effects if e.label == named.effect.label), named.effect)
-    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals[:_SHOWN]]
+    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals[:LISTED]]
     return Physics(
         effect.name,
         effect.label,
@@ -213,6 +209,6 @@ def disturbance_note(view: View) -> list[str]:
     said = [
         f"{e} ({sized(e, q)}, {float(t):.2g} s)"
         for e, q, t, rms in zip(layout.equations, disturbance.force, disturbance.time, total, strict=True)
-        if rms > 0.3 * float(q)
+        if rms > REPORTED_DISTURBANCE * float(q)
     ]
     return [f"What is left looks like random forces in {', '.join(said)}."] if said else []

@@ -12,9 +12,10 @@ from ..recording import Recording
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .batch import batch
-from .cross_validation import LONG_BLOCKS, gain
+from .cross_validation import gain
 from .diagnosis import Gain, Overlay
 from .restarts import restarted
+from .settings import BLOCKS
 from .trial import Model
 
 
@@ -78,7 +79,7 @@ def test_gain(before: Evaluation, after: Evaluation, pieces: int) -> Gain:
 
     By Student's t over blocks of every run, no shorter than the pieces of a simulation.
     """
-    blocks = lambda one: np.concatenate([_sums(run, max(LONG_BLOCKS, pieces)) for run in one.squares])
+    blocks = lambda one: np.concatenate([_sums(run, max(BLOCKS, pieces)) for run in one.squares])
     total = lambda one: float(sum(run.sum() for run in one.squares))
     return Gain(total(after) / max(total(before), 1e-300), gain(-blocks(before), -blocks(after)).better)
 

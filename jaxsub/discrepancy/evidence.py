@@ -25,14 +25,11 @@ from ..estimate import estimate_disturbance
 from ..likelihood import Columns, Disturbance
 from .columns import force_columns
 from .leading import root_or_one
+from .settings import DISTURBANCE_SHARES, MOST_COLUMNS
 from .view import View
 
-# columns that a chosen set may have: the program for its disturbance then has one shape
-SLOTS = 8
-# shares of the disturbance that the model without candidates asks for: what was left out may be part or all of it
-_SHARES = (1.0, 0.1, 0.003)
 # products that evidence begins with
-FIRST = len(_SHARES)
+FIRST = len(DISTURBANCE_SHARES)
 
 
 class Gains(NamedTuple):
@@ -193,7 +190,7 @@ class Evidence:
         first = cls(view, view.base + columns, np.ones(columns.shown.shape[-1]), []).under(own)
         length = root_or_one(np.diag(first.gram)[known:])
         made = cls(view, view.base + jax.tree.map(lambda column: column / length, columns), length, [])
-        shares = [own, *(dataclasses.replace(own, force=share * own.force) for share in _SHARES[1:])]
+        shares = [own, *(dataclasses.replace(own, force=share * own.force) for share in DISTURBANCE_SHARES[1:])]
         for disturbance in disturbances or shares:
             known_already = first.scaled(np.concatenate([np.ones(known), length])) if disturbance is own else None
             made.products.append(known_already or made.under(disturbance))
@@ -216,8 +213,8 @@ class Evidence:
 
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
-        picked = self.picked([*chosen, *[0] * (SLOTS - len(chosen))])
-        filled = np.arange(SLOTS) < len(chosen)
+        picked = self.picked([*chosen, *[0] * (MOST_COLUMNS - len(chosen))])
+        filled = np.arange(MOST_COLUMNS) < len(chosen)
         picked = jax.tree.map(lambda column: np.where(filled, column, 0.0), picked)
         worth = np.where(filled, 1.0 / self.products[0].samples, 1.0)
         prior = np.asarray(block_diag(self.view.prior, np.diag(worth)))

@@ -8,17 +8,11 @@ from .cross_validation import compare
 from .evidence import evidence_of
 from .examine import examine, weighed
 from .many import by_what_comes_next
-from .name import MOST_EFFECTS
 from .progress import OutOfTime
+from .settings import EXPLAINED, MAJORITY, MOST_EFFECTS, MOST_REJECTIONS
 from .trial import Found, Model, Trial, tried, worth_trying
-from .verdict import EXPLAINED, NOTHING, Judged, both, by_fit, idle, incomplete, judge
+from .verdict import NOTHING, Judged, both, by_fit, idle, incomplete, judge
 from .whiteness import share_of
-
-# times that others are asked where all that was named was refused
-_REFUSALS = 2
-# of what names explain and what they leave is told by its own past, the share from which their fit is asked
-_MOST = 0.5
-
 
 # a model, what is to be said with it, and the last look at what it leaves, if anything may be left
 Answer = tuple[Model, Judged, Found | None]
@@ -76,7 +70,7 @@ def answers(
                 yield ahead[0], both(judged, ahead[1]), None
                 return
             told_ahead = True
-            if said.verdict == "unknown" and refusals < _REFUSALS:
+            if said.verdict == "unknown" and refusals < MOST_REJECTIONS:
                 refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
         if after is None and not said.named:
             yield best, judged, found
@@ -116,7 +110,7 @@ def after_all(
     which nothing then seems to have. Names that seemed to explain most and too little for the cause, if their fit does
     not: of what is large a linear picture leaves much, which is no disturbance. Else all is as it was.
     """
-    most = found.nameless is None and found.memory.correlated and found.memory.explained > _MOST
+    most = found.nameless is None and found.memory.correlated and found.memory.explained > MAJORITY
     numbers = [one.number for one in found.naming.named]
     here = numbers if most else [one.number for one in found.naming.named if found.nameless in one.effect.where][:1]
     best, said = tried(trial, base, found, here, judged) if here else (base, judged)

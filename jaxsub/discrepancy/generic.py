@@ -16,14 +16,10 @@ from ..likelihood import Disturbance, smoothed
 from .columns import force_columns
 from .evidence import Evidence, Products
 from .hats import hats, promising, smooth_forces
-from .selector import SIGNIFICANCE
-from .smoothness import FINE, SCALES, Smooth, coarse, smoothest
+from .settings import FORCE_DISTURBANCE_SHARES, LENGTH_SCALES, MAJORITY, SIGNIFICANCE
+from .smoothness import FINE, Smooth, coarse, smoothest
 from .view import View
 
-# of a disturbance, part or most of which may be this force
-_SHARES = (1.0, 0.1, 0.01)
-# of what a smooth function tells, from which a force of few knots is near enough to stand for it
-_NEAR = 0.5
 # of all that the knots tell, which each tells at least
 _ROUNDING = 1e-9
 
@@ -58,7 +54,7 @@ class Pattern:
     @property
     def joins(self) -> bool:
         """Whether the force is near enough to what is there to stand in a model."""
-        return self.significant and self.near > _NEAR
+        return self.significant and self.near > MAJORITY
 
     @property
     def described(self) -> str:
@@ -101,7 +97,11 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     left = chosen.left(columns, under[-1])
     mean, _ = smoothed(under[-1].disturbance, view.followed.system, left)
     weighed = promising(view, forces, np.asarray(mean))
-    asked = [dataclasses.replace(p.disturbance, force=share * p.disturbance.force) for p in under for share in _SHARES]
+    asked = [
+        dataclasses.replace(p.disturbance, force=share * p.disturbance.force)
+        for p in under
+        for share in FORCE_DISTURBANCE_SHARES
+    ]
     # one force after the other: nobody asks for products of one's hats with another's
     picked = chosen.picked(columns)
     of = lambda force: Evidence.of(view, picked + force_columns(view, hats(view, force, FINE)), asked)
@@ -110,7 +110,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     best = int(np.argmax([np.max(each) for each in values]))
     found, at = every[best], int(np.argmax(values[best]))
     gain = float(np.max(values[best])) - found.before
-    p_value = min(1.0, 0.5 * len(forces) * len(SCALES) * float(special.chdtrc(1, 2.0 * max(0.0, gain))))
+    p_value = min(1.0, 0.5 * len(forces) * len(LENGTH_SCALES) * float(special.chdtrc(1, 2.0 * max(0.0, gain))))
     # how large it is is a number of the force, as probable before the data as others; so is which force it is
     alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
     heights, size, explained = found.heights(at)

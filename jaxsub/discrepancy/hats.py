@@ -9,14 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import KNOTS, SmoothForce, variables
+from .settings import BLOCKS, FORCE_RIDGE, FORCES_PER_EQUATION
 from .view import View
 
 # places of the body, with which no force that is worth a description grows
 _LEFT_OUT = ("x", "y")
 _STILL = 1e-9
-# variables that are kept for an equation; knots for choosing them, samples of nothing that each knot begins with, and
-# pieces of a run, each told by the others
-_KEPT, _CHOOSING, _NOTHING, _PIECES = 3, 2 * (KNOTS - 1) + 1, 0.5, 4
+# knots of the regression that picks a force
+_CHOOSING = 2 * (KNOTS - 1) + 1
 
 
 def smooth_forces(view: View) -> list[SmoothForce]:
@@ -43,18 +43,18 @@ def promising(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) ->
     chosen: list[SmoothForce] = []
     for equation in equations:
         own = [force for force in forces if force.equation == equation]
-        chosen += sorted(own, key=lambda force: -told[force.variable][force.equation])[:_KEPT]
+        chosen += sorted(own, key=lambda force: -told[force.variable][force.equation])[:FORCES_PER_EQUATION]
     return chosen
 
 
 def _told(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
     """(n,) share of each equation's missing force that the force's variable tells in pieces by the other pieces."""
     drawn, live = shapes(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
-    pieces = [(r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), _PIECES)]
+    pieces = [(r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), BLOCKS)]
     H, y = [drawn[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
     G = np.array([h.T @ h for h in H])
     b, squares = np.array([h.T @ v for h, v in zip(H, y, strict=True)]), np.array([np.sum(v**2, axis=0) for v in y])
-    others = G.sum(axis=0) - G + _NOTHING * np.eye(_CHOOSING)
+    others = G.sum(axis=0) - G + FORCE_RIDGE * np.eye(_CHOOSING)
     w = np.linalg.solve(others, b.sum(axis=0) - b)
     left = squares - 2.0 * np.sum(w * b, axis=1) + np.sum(w * (G @ w), axis=1)
     return 1.0 - left.sum(axis=0) / np.maximum(squares.sum(axis=0), 1e-300)

@@ -13,6 +13,7 @@ from ..arrays import quietly
 from ..estimate import Fit, Problem, estimate_disturbance
 from ..likelihood import Columns, Disturbance, Followed, follow
 from ..vehicle import AbstractVehicle
+from .settings import PRIOR_WIDTH
 
 # what dampens a scoring step, of a column's squares, and shares of a change of the disturbance, one after the other
 _DAMPED, _SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), (1.0, 0.5)
@@ -21,8 +22,6 @@ _TURNS, _STAYS = 8, 0.5
 _STEPS, _GAINED = 30, 2.0
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
-# times a number of the vehicle file, as far as it may be off where the file does not say
-_ABOUT = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,7 +125,7 @@ def root_or_one(squares: Float[np.ndarray, " q"]) -> Float[np.ndarray, " q"]:
 def of_order(problem: Problem) -> Problem:
     """A problem with a wide prior about each number of the file that has none."""
     vehicle, own = problem.vehicle, problem.vehicle.own_values()
-    width, given = _ABOUT * np.abs(problem.prior_mean), [row.name in own for row in vehicle.layout.free]
+    width, given = PRIOR_WIDTH * np.abs(problem.prior_mean), [row.name in own for row in vehicle.layout.free]
     wide = np.array(given, bool) & (width > 0.0) & np.isinf(problem.prior_std)
     return dataclasses.replace(problem, prior_std=jax.device_put(np.where(wide, width, problem.prior_std)))
 

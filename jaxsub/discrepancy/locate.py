@@ -19,15 +19,16 @@ from .evidence import Evidence
 from .process_noise import NoiseSignal
 from .regime import INCIDENCE, regime, regime_variables
 from .selector import Scan
+from .settings import (
+    FORCE_SIGMAS,
+    GROWTH_RATIO,
+    GROWTH_SCORE,
+    GROWTH_VARIABLES,
+    INTERVAL_GAP,
+    PLACE_SHARE,
+    SUPPORTED_FORCE_SIGMAS,
+)
 from .view import View, missing_force
-
-_SIGNIFICANT = 2.5
-# of a force where the filter's process noise rises too
-_SUPPORTED = 1.5
-_SHOWN = 0.05
-# intervals that are closer than this share of a run are one
-_GAP = 0.02
-_ALIKE, _TOLD = 0.8, 4.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -102,7 +103,7 @@ def locations(field: Field, view: View, recordings: Sequence[Recording], share: 
     """The places with a share worth naming, the largest first."""
     found = []
     for place, part in sorted(share.items(), key=lambda item: -item[1]):
-        if part < _SHOWN:
+        if part < PLACE_SHARE:
             continue
         if place in view.vehicle.layout.equations:
             clear = [_clear(trace, place, field.signals) for trace in field.traces]
@@ -133,10 +134,10 @@ def _regime(view: View, clear: Sequence[np.ndarray]) -> Regime | None:
 def _clear(trace: ForceTrace, equation: str, signals: Sequence[NoiseSignal]) -> np.ndarray:
     """The samples (K,) at which a force stands clear of its band; less clear where a filter agrees."""
     size = np.abs(trace.force[equation]) / np.maximum(trace.band[equation], 1e-300)
-    clear = size > _SIGNIFICANT
+    clear = size > FORCE_SIGMAS
     for signal in signals:
         if signal.run == trace.run:
-            clear |= (size > _SUPPORTED) & signal.rises(equation, trace.times)
+            clear |= (size > SUPPORTED_FORCE_SIGMAS) & signal.rises(equation, trace.times)
     return clear
 
 
@@ -145,13 +146,13 @@ def _intervals(trace: ForceTrace, clear: np.ndarray) -> list[tuple[str, float, f
     at = np.flatnonzero(clear)
     if not len(at):
         return []
-    gap = _GAP * (trace.times[-1] - trace.times[0])
+    gap = INTERVAL_GAP * (trace.times[-1] - trace.times[0])
     cuts = np.flatnonzero(np.diff(trace.times[at]) > gap) + 1
     parts = np.split(at, cuts)
     return [(trace.run, float(trace.times[part[0]]), float(trace.times[part[-1]])) for part in parts]
 
 
-def grows_with(view: View, equation: str, most: int = 3) -> list[str]:
+def grows_with(view: View, equation: str) -> list[str]:
     """The variables with which a force in `equation` would have to grow to explain the recordings, best first.
 
     Each is scored like a candidate effect: a force proportional to it, what the coefficients can absorb projected off.
@@ -163,8 +164,8 @@ def grows_with(view: View, equation: str, most: int = 3) -> list[str]:
     pushed = [np.stack([motion[name] for motion in (starts, ends)])[..., None] * own for name in names]
     evidence = Evidence.of(view, force_columns(view, pushed), [view.disturbance])
     gain = evidence.products[0].gains([], [[i] for i in range(len(names))]).statistic
-    ranked = np.argsort(-gain)[:most]
-    return [names[i] for i in ranked if gain[i] > _ALIKE * gain[ranked[0]] and gain[i] > _TOLD]
+    ranked = np.argsort(-gain)[:GROWTH_VARIABLES]
+    return [names[i] for i in ranked if gain[i] > GROWTH_RATIO * gain[ranked[0]] and gain[i] > GROWTH_SCORE]
 
 
 def motion_variables(motion: Motion) -> dict[str, np.ndarray]:

@@ -16,16 +16,17 @@ from .examine import listed, weighed
 from .model import p_value
 from .name import Named, asked_still, named_on, refitted, standing
 from .rivals import told_apart
-from .selector import SIGNIFICANCE, Selector
+from .selector import Selector
+from .settings import (
+    CLEAR_LOG_BAYES,
+    LINEARISATION_LOSS,
+    MOST_EFFECTS_ONE_STEP,
+    MOST_REJECTIONS,
+    RIVALS_FITTED,
+    SIGNIFICANCE,
+)
 from .trial import Model, Trial, Tries, upright, worth_trying
 from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
-
-# effects beyond which no more are sought, and sets that may be refused
-_MANY, _REFUSALS = 16, 2
-# of log evidence, what may be less and yet be tried in the place of a name, and how many are
-_CLOSE, _ANEW = 3.0, 2
-# of what a name explains, the share that a linear picture without it may lose
-_LOST = 0.1
 
 
 def by_what_comes_next(
@@ -36,7 +37,7 @@ def by_what_comes_next(
     search = _Search(ahead, ahead.begin(base), vocabulary)
     best, named = search.start, list[Named]()
     judged, fallen, refusals = NOTHING, set[str](), 0
-    while len(best.added) < _MANY and refusals <= _REFUSALS:
+    while len(best.added) < MOST_EFFECTS_ONE_STEP and refusals <= MOST_REJECTIONS:
         selector = search.listed(best)
         selector.usable[[effect.label in fallen for effect in selector.candidates]] = False
         found = weighed(best.view, selector, trial.progress)
@@ -132,16 +133,16 @@ class _Search:
             own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
             number = max(own, key=lambda i, value=scan.value: value[i])
             without, again = (selector.evidence.best(selector.columns(some))[0] for some in ([], [number]))
-            if np.isfinite(scan.value[number]) and whole - again < _LOST * (whole - without):
+            if np.isfinite(scan.value[number]) and whole - again < LINEARISATION_LOSS * (whole - without):
                 break
         if not np.isfinite(scan.value[number]):
             return one, []
-        close = (scan.value > scan.value[number] - _CLOSE) & ~asked_still(selector, [], number, scan)
+        close = (scan.value > scan.value[number] - CLEAR_LOG_BAYES) & ~asked_still(selector, [], number, scan)
         close[own] = False
         others: dict[str, AbstractEffect] = {}
         for i in (i for i in np.argsort(-scan.value) if close[i]):
             others.setdefault(scan.effects[i].label, scan.effects[i])
-        return named_on(selector, [], number), [*others.values()][:_ANEW]
+        return named_on(selector, [], number), [*others.values()][:RIVALS_FITTED]
 
 
 def asked_for(

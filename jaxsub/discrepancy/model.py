@@ -12,11 +12,9 @@ from ..estimate import Ended, Fit, evaluate, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .leading import by_cost
-from .selector import SIGNIFICANCE
+from .settings import NEGLIGIBLE, SIGNIFICANCE
 from .view import View
 
-# a shape such as a lag at which its effect is gone
-_VANISHED = 1e-6
 # of a column whose squares are zero in floating point
 _NO_COLUMN = 1e-100
 
@@ -73,7 +71,7 @@ def sound(fit: Ended, effects: Sequence[AbstractEffect]) -> bool:
     for effect in (e for e in fit.vehicle.effects if e.label in labels):
         found, linear, units = numbers(effect), amplitudes(effect), effect.units()
         times = {n for n in found if isinstance(effect, AbstractMemory) and units[n] == "s"}
-        least = {n: shortest if n in times else _VANISHED for n in found}
+        least = {n: shortest if n in times else NEGLIGIBLE for n in found}
         vanished = any(v <= least[n] for n, v in found.items() if n not in linear)
         if vanished or not admissible(effect, found) or any(found[n] >= longest for n in times):
             return False

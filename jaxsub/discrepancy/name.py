@@ -17,19 +17,18 @@ from ..effects import AbstractEffect, numbers
 from .diagnosis import Candidate
 from .evidence import Products
 from .progress import Progress
-from .selector import SIGNIFICANCE, Scan, Selector
-
-MOST_EFFECTS = 4
-_POSSIBLE = 0.02
-# disturbances estimated for rivals of one step
-_TRIES = 3
-# how far off a candidate's χ² may be, over the root of what coefficients leave of it, and at most; twins refitted
-_OFF, _FAR_OFF, _TWINS = 0.03, 0.3, 2
-# and between effects that act in the same place: where a motion is no larger than its noise, a picture along it gives
-# the square of a rate too much and its cube too little
-_SAME_PLACE = 0.5
-# of its χ², what a rival has left at most once the other is in the model
-_ASKED_STILL = 0.5
+from .selector import Scan, Selector
+from .settings import (
+    DISTURBANCE_ESTIMATES,
+    ESTIMATED_LOG_BAYES,
+    MAJORITY,
+    MOST_EFFECTS,
+    MOST_SCORE_ERROR,
+    RIVAL_PROBABILITY,
+    RIVALS_FITTED,
+    SCORE_ERROR,
+    SIGNIFICANCE,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,10 +115,10 @@ def _settled(selector: Selector, chosen: list[int]) -> Scan:
 
 def _led(selector: Selector, chosen: list[int]) -> Scan:
     """The scan once the best, or the first few that were, have their own disturbances estimated."""
-    for _ in range(_TRIES):
+    for _ in range(DISTURBANCE_ESTIMATES):
         scan = selector.scan(chosen)
         best = int(np.argmax(scan.value))
-        if not np.isfinite(scan.value[best]) or scan.value[best] - selector.value(chosen) < -5.0:
+        if not np.isfinite(scan.value[best]) or scan.value[best] - selector.value(chosen) < -ESTIMATED_LOG_BAYES:
             return scan
         if tuple(sorted([*chosen, best])) in selector.estimated:
             return scan
@@ -173,16 +172,18 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
         key = effect.label if effect.name == own else effect.name
         if log[i] > log[best.setdefault(key, i)]:
             best[key] = i
-    rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > _POSSIBLE]
+    rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > RIVAL_PROBABILITY]
     # what coefficients absorb of an effect, they absorb of the picture's errors too, but not as exactly
-    off = min(_FAR_OFF, _OFF / np.sqrt(max(selector.kept[index], 1e-12)))
+    off = min(MOST_SCORE_ERROR, SCORE_ERROR / np.sqrt(max(selector.kept[index], 1e-12)))
     near = [j for key, j in best.items() if key != label and np.isfinite(log[j])]
     place = scan.effects[index].where
-    far = lambda j: _SAME_PLACE if scan.effects[j].where == place else off
+    # where a motion is no larger than its noise, a picture along it gives the square of a rate too much and its cube
+    # too little
+    least = lambda j: MAJORITY if scan.effects[j].where == place else 1.0 - off
     # a free run may ask for what is less probable sample by sample than a rival, which then is tried before it
-    alike = lambda j: scan.statistic[j] > (1.0 - far(j)) * scan.statistic[index] or log[j] > log[index]
+    alike = lambda j: scan.statistic[j] > least(j) * scan.statistic[index] or log[j] > log[index]
     near = [j for j in near if alike(j)]
-    twins = sorted(near, key=lambda j: -log[j])[:_TWINS]
+    twins = sorted(near, key=lambda j: -log[j])[:RIVALS_FITTED]
     return Named(index, scan.effects[index], min(1.0, by_name[own]), sorted(rivals, key=lambda rival: -rival[1]), twins)
 
 
@@ -193,7 +194,7 @@ def asked_still(selector: Selector, others: Sequence[int], index: int, scan: Sca
     """
     beside = selector.scan([*others, index])
     asked = np.array([selector.p_value(i, beside) < SIGNIFICANCE for i in range(len(beside.value))])
-    return asked & (beside.statistic > _ASKED_STILL * scan.statistic)
+    return asked & (beside.statistic > MAJORITY * scan.statistic)
 
 
 def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Named:
@@ -206,7 +207,7 @@ def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Na
     share = named.probability + sum(p for rival, p in named.rivals if rival.name in names)
     found = [(effect, share * float(w)) for (effect, _), w in zip(values, weights, strict=True)]
     others = [pair for pair in named.rivals if pair[0].name not in names]
-    others += [pair for pair in found if pair[0].name != named.effect.name and pair[1] > _POSSIBLE]
+    others += [pair for pair in found if pair[0].name != named.effect.name and pair[1] > RIVAL_PROBABILITY]
     probability = min(1.0, sum(p for effect, p in found if effect.name == named.effect.name))
     return dataclasses.replace(named, probability=probability, rivals=sorted(others, key=lambda pair: -pair[1]))
 

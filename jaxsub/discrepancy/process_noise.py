@@ -37,16 +37,8 @@ from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
+from .settings import LEVEL, NOISE_FLOOR, NOISE_RANGE, NOISE_WINDOW, PRIOR_WIDTH
 
-ALARM_RATE = 0.05
-# Q₀ per root second in sensors' sigmas: with less the filter's uncertainty is slow to follow, with more it corrects so
-# much at once that a small force drowns in the sensors' noise
-_FLOOR = 0.1
-_LEAST, _MOST = 1e-4, 10.0
-# the start that a fit found has missing physics in it: the filter takes its own from the first samples
-_VAGUE = 10.0
-# measurements in the rule's window; samples in the average, and to settle in
-_WIDTH, _WINDOW, _SETTLED = 10, 50, 25
 _SEED = 0
 
 
@@ -59,7 +51,7 @@ class NoiseSignal:
     - `times`: (k,) s on the recording's clock. `window`: s over which densities are averaged.
     - `std`: by equation, (k,) root of the density of Q_ii, state units per root second.
     - `ratio`: by equation, (k,) the rule's part of Q_ii, averaged, over that of clean simulations at the same time.
-    - `threshold`: of the ratio; clean recordings exceed it anywhere, in any equation or run, at the rate `ALARM_RATE`.
+    - `threshold`: of the ratio; clean recordings exceed it anywhere, in any equation or run, at the rate `LEVEL`.
     """
 
     run: str
@@ -99,13 +91,13 @@ def noise_signals(fit: Fit, recordings: Sequence[Recording], copies: int = 19) -
     densities = noise_densities(vehicle, fit.runs, fit.start, fit.sigma, copies)
     clean, recorded = (np.asarray(density) for density in densities)
     lengths = np.asarray(fit.runs.live).sum(1) + 1
-    if not (np.isfinite(clean).all() and np.isfinite(recorded).all() and lengths.min() > _SETTLED):
+    if not (np.isfinite(clean).all() and np.isfinite(recorded).all() and lengths.min() > NOISE_WINDOW // 2):
         return []
     ratios, threshold = calibrated(clean, recorded, lengths)
     std = np.sqrt(recorded + floor(vehicle, np.asarray(fit.sigma)) ** 2)
     signals = []
     for run, recording in enumerate(recordings):
-        k, window = int(lengths[run]), _WINDOW * float(np.median(np.diff(recording.times)))
+        k, window = int(lengths[run]), NOISE_WINDOW * float(np.median(np.diff(recording.times)))
         of = lambda values, run=run, k=k: dict(zip(vehicle.layout.equations, values[run, :k].T, strict=True))
         signals.append(NoiseSignal(recording.name, recording.times, window, of(std), of(ratios), threshold))
     return signals
@@ -115,7 +107,7 @@ def noise_note(signals: Sequence[NoiseSignal]) -> list[str]:
     """One line: the equations and times where the filter's process noise rises; none without signals."""
     if not signals:
         return []
-    clean = f"clean runs do so anywhere with probability {ALARM_RATE:g}"
+    clean = f"clean runs do so anywhere with probability {LEVEL:g}"
     risen = [
         f"{equation} ({signal.run}: {', '.join(f'{a:.0f} to {b:.0f} s' for a, b in signal.intervals(equation))})"
         for signal in signals
@@ -129,19 +121,20 @@ def noise_note(signals: Sequence[NoiseSignal]) -> list[str]:
 def calibrated(
     clean: Float[np.ndarray, "m r k n"], recorded: Float[np.ndarray, "r k n"], lengths: np.ndarray
 ) -> tuple[Float[np.ndarray, "r k n"], float]:
-    """Averaged densities over the mean of the clean ones, and the threshold that clean runs cross at `ALARM_RATE`.
+    """Averaged densities over the mean of the clean ones, and the threshold that clean runs cross at `LEVEL`.
 
     `lengths` (r,) are the samples of each run.
     """
     place = np.arange(recorded.shape[1])
-    live = (place < lengths[:, None]) & (place >= _SETTLED)
+    # until then the filter settles
+    live = (place < lengths[:, None]) & (place >= NOISE_WINDOW // 2)
     copies = _averaged(clean, live)
     together = copies.sum(axis=0)
     # a copy counts not among those that it is held against, as the recording does not
     others = np.maximum((together - copies) / (len(copies) - 1), 1e-300)
     highest = np.sort(np.max(copies / others, axis=(1, 2, 3), where=live[..., None], initial=0.0))
     # were the recording clean, it would be as likely as any copy to be the highest
-    rank = int(np.ceil((1.0 - ALARM_RATE) * (len(copies) + 1) - 1e-9))
+    rank = int(np.ceil((1.0 - LEVEL) * (len(copies) + 1) - 1e-9))
     ratios = _averaged(recorded[None], live)[0] / np.maximum(together / len(copies), 1e-300)
     return np.where(live[..., None], ratios, 0.0), float(highest[rank - 1])
 
@@ -149,7 +142,7 @@ def calibrated(
 def _averaged(density: Float[np.ndarray, "m r k n"], live: Bool[np.ndarray, "r k"]) -> Float[np.ndarray, "m r k n"]:
     """The mean of what is live over a centred window, which is shorter at the ends of a run."""
     place = np.arange(density.shape[2])
-    first, last = np.maximum(place - _WINDOW // 2, 0), np.minimum(place + _WINDOW // 2, len(place))
+    first, last = np.maximum(place - NOISE_WINDOW // 2, 0), np.minimum(place + NOISE_WINDOW // 2, len(place))
 
     def window(values: np.ndarray) -> np.ndarray:
         sums = np.concatenate([np.zeros_like(values[:, :, :1]), np.cumsum(values, axis=2)], axis=2)
@@ -180,14 +173,17 @@ def noise_filter(vehicle: AbstractVehicle, substeps: int, sigma: Float[Array, " 
     """The extended Kalman filter of a vehicle whose numbers are all known, with fuzzy noise above a constant one."""
     known = vehicle.holding(vehicle.values())
     scale = jnp.asarray(state_scale(known, sigma))
-    constant = ConstantNoise(jnp.diag(_FLOOR * scale))
-    rule = Above(constant, FuzzyNoise(_LEAST * scale, _MOST * scale, width=_WIDTH))
-    return ExtendedKalmanFilter(VehicleProcess.of(known, substeps), rule, jnp.diag(sigma), jnp.diag(_VAGUE * scale))
+    constant = ConstantNoise(jnp.diag(NOISE_FLOOR * scale))
+    least, most = NOISE_RANGE
+    rule = Above(constant, FuzzyNoise(least * scale, most * scale))
+    # the start that a fit found has missing physics in it: the filter takes its own from the first samples
+    begin = jnp.diag(PRIOR_WIDTH * scale)
+    return ExtendedKalmanFilter(VehicleProcess.of(known, substeps), rule, jnp.diag(sigma), begin)
 
 
 def floor(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values, " n"]:
     """Root of the constant density beneath the rule's, of each equation."""
-    return _FLOOR * state_scale(vehicle, sigma)[: len(vehicle.layout.equations)]
+    return NOISE_FLOOR * state_scale(vehicle, sigma)[: len(vehicle.layout.equations)]
 
 
 @eqx.filter_jit

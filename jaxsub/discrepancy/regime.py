@@ -7,11 +7,9 @@ from jaxtyping import Bool, Float
 
 from ..effects import Motion, by_name
 from .diagnosis import Regime
+from .settings import LEVEL, REGIME_AREA, REGIME_SHARE
 
-# how probable a sample inside must be to lie further that way than one outside, to be worth saying
-_CLEAR = 0.75
-_CHANCE, _SHIFTS = 0.05, 199
-_LEAST = 0.01  # of all samples, inside and outside
+_SHIFTS = 199  # of the test by chance
 _STILL = 1e-9
 INCIDENCE = ("attack", "sideslip")  # angles of the flow, rad
 
@@ -38,7 +36,7 @@ def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.
     threshold is Youden's (1950).
     """
     share = inside[live].mean() if live.any() else 0.0
-    if not variables or not _LEAST < share < 1.0 - _LEAST:
+    if not variables or not REGIME_SHARE < share < 1.0 - REGIME_SHARE:
         return None
     names = [*variables]
     from scipy import stats
@@ -47,11 +45,11 @@ def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.
     areas = _areas(ranks, inside[live])
     best = int(np.argmax(np.abs(areas - 0.5)))
     reached = abs(areas[best] - 0.5)
-    if reached < _CLEAR - 0.5:
+    if reached < REGIME_AREA - 0.5:
         return None
     rng = np.random.default_rng(0)
     luck = [np.max(np.abs(_areas(ranks, _moved(inside, live, rng)[live]) - 0.5)) >= reached for _ in range(_SHIFTS)]
-    if (1 + np.sum(luck)) / (1 + _SHIFTS) > _CHANCE:
+    if (1 + np.sum(luck)) / (1 + _SHIFTS) > LEVEL:
         return None
     return _parted(names[best], variables[names[best]][live], inside[live], bool(areas[best] > 0.5))
 

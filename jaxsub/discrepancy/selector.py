@@ -11,22 +11,20 @@ from scipy import special
 from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
 from ..likelihood import Disturbance
 from .columns import plausible
-from .evidence import FIRST, SLOTS, Evidence, Products
+from .evidence import FIRST, Evidence, Products
+from .settings import (
+    IDENTIFIABLE_SHARE,
+    LARGE_ERROR,
+    MAJOR_SHARE,
+    MAJORITY,
+    MINOR_SHARE,
+    MOST_COLUMNS,
+    NEGLIGIBLE,
+    PLAUSIBILITY_SCORE,
+    SIGNIFICANCE,
+    SIMULATION_RATIO,
+)
 from .view import View
-
-SIGNIFICANCE = 0.01
-_ABSORBED = 1e-4
-# χ² from which a candidate may come to be chosen
-_LOOKED_AT = 10.0
-# shares of a free run's errors: a leader that explains so little gives way to one that explains so much
-_LITTLE, _MORE = 0.02, 0.2
-# and the share of what rules it
-_MUCH = 0.5
-# times the noise, from which squared errors of a free run are large
-_LARGE = 4.0
-# times the errors that a candidate leaves and explains: what may stand in its place leaves no more, explains no less
-_NO_MORE, _NO_LESS = 2.0, 0.5
-_STILL = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,7 +58,7 @@ class Selector:
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
         own = evidence.view.disturbance
         # a free run has no disturbance to put errors down to
-        still = Disturbance(_STILL * own.force, own.time, np.ones_like(own.noise))
+        still = Disturbance(NEGLIGIBLE * own.force, own.time, np.ones_like(own.noise))
         self.free = evidence.under(still)
         self.lost = False
         forms = collections.Counter(effect.name for effect in self.candidates)
@@ -80,7 +78,7 @@ class Selector:
         self.kept = self.evidence.products[0].kept(self.owners)
         present = {effect.label for effect in self.evidence.view.vehicle.effects}
         absent = np.array([effect.label not in present for effect in self.candidates], bool)
-        self.usable = np.isfinite(self.kept) & (self.kept > _ABSORBED) & absent
+        self.usable = np.isfinite(self.kept) & (self.kept > IDENTIFIABLE_SHARE) & absent
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Selector":
         """The same candidates asked of a view that `Evidence.seen_from` takes."""
@@ -126,8 +124,8 @@ class Selector:
             effects.append(predicted)
             good = good and bool(self.usable[i]) and effect.label not in taken
             # worth a look only where it may be chosen
-            right.append(good and (statistic[i] < _LOOKED_AT or plausible(self.evidence.view, predicted)))
-        fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= SLOTS)
+            right.append(good and (statistic[i] < PLAUSIBILITY_SCORE or plausible(self.evidence.view, predicted)))
+        fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= MOST_COLUMNS)
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
 
@@ -164,9 +162,9 @@ class Selector:
         """
         best = int(np.argmax(scan.value))
         share = self.of_free_run(chosen)
-        if self.lost or share[best] > _LITTLE:
+        if self.lost or share[best] > MINOR_SHARE:
             return best
-        asked = self._asked(chosen, scan) & (share > _MORE)
+        asked = self._asked(chosen, scan) & (share > MAJOR_SHARE)
         if not np.any(asked):
             return best
         best = int(np.argmax(np.where(asked, share, -np.inf)))
@@ -185,9 +183,9 @@ class Selector:
         """
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
         share = self.of_free_run([])
-        if self.lost or not self.free.gram[0, 0] > _LARGE * noise * self.free.samples:
+        if self.lost or not self.free.gram[0, 0] > LARGE_ERROR**2 * noise * self.free.samples:
             return np.zeros_like(share)
-        return np.where((share > _MUCH) & self._asked([], self.scan([])), share, 0.0)
+        return np.where((share > MAJORITY) & self._asked([], self.scan([])), share, 0.0)
 
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate may stand where `index` does, on top of `chosen`.
@@ -198,7 +196,7 @@ class Selector:
         if index not in self.freely:
             return np.ones(len(self.candidates), bool)
         share = self.of_free_run(chosen)
-        return (1.0 - share <= _NO_MORE * (1.0 - share[index])) & (share >= _NO_LESS * share[index])
+        return (1.0 - share <= SIMULATION_RATIO * (1.0 - share[index])) & (share >= share[index] / SIMULATION_RATIO)
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
         """Whether `more` helps to predict parts of the recordings, or of a free run that asked, from the others."""

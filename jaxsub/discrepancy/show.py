@@ -7,12 +7,8 @@ import numpy as np
 from ..estimate import Fit
 from ..recording import Recording
 from .diagnosis import ChannelQuality, Coefficient, Estimate, RunQuality
+from .settings import CORRELATED, UNEXCITED_ERROR, WEAK_ERROR
 from .whiteness import record_sigma
-
-_WEAK, _OPEN = 0.5, 5.0
-# correlation of two numbers from which on they are told together and hardly apart
-_TRADES = 0.9
-_TINY = 1e-300
 
 
 def coefficients(start: dict[str, float], baseline: Fit, improved: Fit) -> list[Coefficient]:
@@ -46,18 +42,18 @@ def trades(fit: Fit, label: str) -> dict[str, float]:
     """
     own = [name.startswith(f"{label}.") for name in fit.names]
     covariance = np.asarray(fit.covariance)
-    size = np.sqrt(np.maximum(np.diag(covariance), _TINY))
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     between = (covariance / size[:, None] / size)[own]
     if not between.size:
         return {}
     worst = between[np.argmax(np.abs(between), axis=0), np.arange(len(own))]
-    found = {n: float(r) for n, r, mine in zip(fit.names, worst, own, strict=True) if not mine and abs(r) >= _TRADES}
+    found = {n: float(r) for n, r, mine in zip(fit.names, worst, own, strict=True) if not mine and abs(r) >= CORRELATED}
     return dict(sorted(found.items(), key=lambda item: -abs(item[1])))
 
 
 def _verdict(estimate: Estimate) -> str:
     ratio = estimate.standard_error / max(abs(estimate.value), 1e-300)
-    return "identified" if ratio < _WEAK else "weak" if ratio < _OPEN else "not excited"
+    return "identified" if ratio < WEAK_ERROR else "weak" if ratio < UNEXCITED_ERROR else "not excited"
 
 
 def channel_quality(fit: Fit) -> list[ChannelQuality]:

@@ -25,11 +25,10 @@ import numpy as np
 from ..effects import KNOTS
 from .evidence import Products
 from .hats import shapes
+from .settings import LENGTH_SCALES
 
 # three knots between any two of `SmoothForce`
 FINE = 4 * (KNOTS - 1) + 1
-# of the variable's range
-SCALES = (1 / 3, 1 / 10, 1 / 30)
 # s² in units of the one for which the best told shape has a prior as wide as its error
 _SIZES = np.geomspace(1e-2, 1e8, 61)
 _ROUNDING = 1e-8
@@ -69,7 +68,7 @@ def smoothest(products: Products, chosen: Sequence[int], hats: Sequence[int], le
 def _roots() -> list[np.ndarray]:
     """A root of the covariance of the heights for each scale."""
     apart = np.subtract.outer(np.arange(FINE), np.arange(FINE)) / (FINE - 1)
-    covariances = [np.exp(-0.5 * (apart / scale) ** 2) + _ROUNDING * np.eye(FINE) for scale in SCALES]
+    covariances = [np.exp(-0.5 * (apart / scale) ** 2) + _ROUNDING * np.eye(FINE) for scale in LENGTH_SCALES]
     return [np.linalg.cholesky(covariance) for covariance in covariances]
 
 

@@ -19,17 +19,17 @@ from .examine import listed, weighed
 from .model import allowing_for, sound
 from .progress import OutOfTime
 from .selector import Selector
+from .settings import (
+    FORCE_SPREADS,
+    MOST_EFFECTS,
+    PLACE_SHARE,
+    SURROGATE_FITS,
+    SURROGATE_GAIN,
+    SURROGATE_INFLATION,
+    SURROGATE_ROUNDS,
+)
 from .trial import Found, Model, Trial
 from .verdict import Judged, helped, incomplete, standing_in
-
-# effects that stand in at a time, sets of them that are fitted, and times that more are asked for
-_AT_ONCE, _TRIES, _TIMES = 4, 5, 3
-# of the squared errors of a free run, the share that each must explain, and all must remove in cross-validation
-_ENOUGH, _LITTLE = 0.05, 0.01
-# times a standard error, to which it may grow beside a description
-_ABOUT = 2.0
-# of how far from zero a force without a name was found to be
-_SHARES = (1.0, 0.5, 0.25)
 
 
 def described(
@@ -49,7 +49,7 @@ def _described(
     trial: Trial, named: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged]:
     model, selector = named, found.selector
-    for _ in range(_TIMES if found.remains else 0):
+    for _ in range(SURROGATE_ROUNDS if found.remains else 0):
         more = _with_more(trial, named, model, selector)
         if more is None:
             break
@@ -68,7 +68,7 @@ def _with_more(trial: Trial, named: Model, model: Model, selector: Selector) -> 
     does not help only the first half is tried again.
     """
     asked = freest(selector)
-    for _ in range(_TRIES):
+    for _ in range(SURROGATE_FITS):
         if not asked:
             return None
         more = _fitted(trial, named, model, asked, selector.evidence.best([])[1].disturbance)
@@ -89,7 +89,7 @@ def _worth(model: Model, more: Model) -> bool:
     What hardly changes anything may do so significantly, and would then ask for a round of fits more.
     """
     gain = compare(model.predicted, more.predicted)
-    better = gain.ratio < 1.0 - _LITTLE and float(more.fit.cost) < float(model.fit.cost)
+    better = gain.ratio < 1.0 - SURROGATE_GAIN and float(more.fit.cost) < float(model.fit.cost)
     return more.view.finite and gain.accepted and better
 
 
@@ -103,7 +103,7 @@ def _fitted(
     if not free or not sound(more.fit, effects) or not float(more.fit.cost) < float(model.fit.cost):
         return more
     before, after = (allowing_for(one.view, one.fit).standard_errors for one in (named, more))
-    if all(after[name] < _ABOUT * before[name] for name in free):
+    if all(after[name] < SURROGATE_INFLATION * before[name] for name in free):
         return more
     return trial.with_effects(_holding(model, named, own), effects, disturbance)
 
@@ -122,13 +122,13 @@ def freest(selector: Selector) -> list[AbstractEffect]:
     Of what moves the vehicle: a sensor that is wrong is no description of it.
     """
     chosen: list[int] = []
-    while len(chosen) < _AT_ONCE:
+    while len(chosen) < MOST_EFFECTS:
         share = selector.of_free_run(chosen)
         taken = {selector.candidates[i].label for i in chosen}
         may = [int(i) for i in np.argsort(-share) if selector.usable[i] and selector.candidates[i].label not in taken]
         moves = (i for i in may if not isinstance(selector.candidates[i], AbstractInstrument))
         best = next((i for i in moves if selector.freely_predicted(chosen, i)[1]), None)
-        if best is None or share[best] < _ENOUGH:
+        if best is None or share[best] < PLACE_SHARE:
             break
         chosen.append(best)
     beside = [selector.freely_predicted([j for j in chosen if j != i], i) for i in chosen]
@@ -145,7 +145,7 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
         return base, judged
     force, disturbance = found.pattern.force, found.naming.products.disturbance
     last = np.inf
-    for share in _SHARES:
+    for share in FORCE_SPREADS:
         less = dataclasses.replace(force, spread=share * force.spread)
         more = _fitted(trial, named, base, [less], disturbance)
         gain = compare(base.predicted, more.predicted, more.admitted)

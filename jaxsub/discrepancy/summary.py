@@ -5,9 +5,7 @@ from collections.abc import Sequence
 from ..effects import AbstractEffect, SmoothForce
 from .consistency import sigmas
 from .diagnosis import Explained, Location, Physics, Verdict
-
-# p-value of a mismatch below which training runs alone would call it significant
-_SIGNIFICANT = 0.01
+from .settings import SIGNIFICANCE
 
 
 def summary(
@@ -65,7 +63,7 @@ def _verdict(
 
 
 def _nothing(found: Explained, p_value: float) -> str:
-    start = "No missing effect is significant" if p_value >= _SIGNIFICANT else "No missing effect holds on the test run"
+    start = "No missing effect is significant" if p_value >= SIGNIFICANCE else "No missing effect holds on the test run"
     if not found.left:
         return f"{start}: the model explains the recordings, and the test run to its noise."
     return f"{start}, but the simulation error on the test run is more than its noise: {sigmas(found.left)}."

@@ -18,16 +18,13 @@ from .name import Named, Naming, named_on, refitted, standing
 from .programs import make_room
 from .progress import Progress
 from .rivals import told_apart
-from .selector import SIGNIFICANCE, Selector
+from .selector import Selector
+from .settings import DOMINANT_SHARE, FORCE_RATIO, SIGNIFICANCE
 from .stiffness import substeps_for, substeps_unseen
 from .verdict import Judged, helped, settled
 from .view import View, look
 from .whiteness import Memory
 
-# times the errors that a force without a name leaves in a free run
-_MUCH_LESS = 4.0
-# of the log evidence that all of some candidates gain, from which one that gains so much alone is tried by itself first
-_NEARLY_ALL = 0.9
 # candidates by number with the log evidence of a fit
 Fits = list[tuple[int, float]]
 
@@ -256,7 +253,7 @@ def leading(selector: Selector, chosen: Sequence[int]) -> list[int]:
     before = selector.value([])
     gains = {index: selector.value([index]) - before for index in chosen}
     best = max(gains, key=lambda index: gains[index])
-    return [best] if gains[best] > _NEARLY_ALL * (selector.value(chosen) - before) else []
+    return [best] if gains[best] > DOMINANT_SHARE * (selector.value(chosen) - before) else []
 
 
 def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged: Judged) -> tuple[Model, Judged]:
@@ -305,7 +302,7 @@ def worth_trying(found: Found, judged: Judged) -> list[int]:
     if not np.any(share):
         return []
     nameless = 1.0 - most_explained(found.view, selector.free.disturbance)
-    for among, less in ((numbers, _MUCH_LESS), (range(len(share)), 1.0)):
+    for among, less in ((numbers, FORCE_RATIO), (range(len(share)), 1.0)):
         best = max(among, key=lambda i: share[i], default=None)
         if best is not None and share[best] > 0.0 and 1.0 - share[best] <= less * nameless:
             selector.freely.add(best)

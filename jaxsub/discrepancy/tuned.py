@@ -14,13 +14,12 @@ import numpy as np
 from ..effects import Facts
 from .columns import force_columns
 from .evidence import Evidence, Products
+from .settings import TONE_SCORE
 from .view import View
 
-# of independent frequencies: the largest step, and the smallest worth another look
-_FAR, _NEAR = 1.0, 0.02
+# of independent frequencies, of which a step is no more than one: the smallest step that is worth another
+_NEAR = 0.02
 _STEPS = 4
-# χ² from which a wave is worth a step: what is less is as likely noise
-_ASKED = 25.0
 
 
 def tuned(view: View, known: Facts) -> Facts:
@@ -34,7 +33,7 @@ def tuned(view: View, known: Facts) -> Facts:
     for _ in range(1 + _STEPS):
         value, step = _looked(view, equations, now, 0.5 * known.duration)
         best, most = np.where(value > most, now, best), np.maximum(value, most)
-        step = np.where(value < most, 0.0, np.clip(step, -_FAR * line, _FAR * line))
+        step = np.where(value < most, 0.0, np.clip(step, -line, line))
         if np.all(np.abs(step) < _NEAR * line):
             break
         now = best + step
@@ -64,5 +63,5 @@ def _of(products: Products, length: np.ndarray, count: int) -> tuple[np.ndarray,
     wave = products.gains([], [[4 * i, 4 * i + 1] for i in range(count)])
     near = products.gains([], [range(4 * i, 4 * i + 4) for i in range(count)])
     a, b, p, q = (np.stack(near.amplitudes) / length.reshape(count, 4)).T
-    step = np.where(wave.statistic > _ASKED, (b * q - a * p) / np.maximum(a * a + b * b, 1e-300), 0.0)
+    step = np.where(wave.statistic > TONE_SCORE, (b * q - a * p) / np.maximum(a * a + b * b, 1e-300), 0.0)
     return products.log_evidence([]) + wave.evidence, step

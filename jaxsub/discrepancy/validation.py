@@ -13,13 +13,10 @@ from scipy import special
 from ..likelihood.whiteness import portmanteau
 from ..recording import Recording
 from ..vehicle import Layout
-from .cross_validation import LONG_BLOCKS
 from .diagnosis import Remainder
+from .settings import BLOCKS, LEVEL, RESIDUAL_LEVEL
 
-CHANCE = 1e-3  # below it what remains is not random, or goes with an input
 _DELAYS = 60  # from one sample to a quarter of the longest run
-_SURE = 0.975  # each end of an interval of 95 %
-_TINY = 1e-300
 _STILL = 1e-9  # of its size: what moves less is rounding
 
 # (r, K) samples of runs, zero where there is none
@@ -52,8 +49,8 @@ def remainders(
 def beyond_noise(left: dict[str, Remainder], rms: dict[str, float], layout: Layout) -> list[str]:
     """One line: the channels of stated noise in which free runs leave more than it, which is not random either."""
     stated = [output.channel for output in layout.outputs if output.sigma is not None]
-    found = [c for c in stated if left[c].low > 1.0 and left[c].random < CHANCE]
-    led = lambda one: f", with {one.follows}" if one.independent < CHANCE else ""
+    found = [c for c in stated if left[c].low > 1.0 and left[c].random < RESIDUAL_LEVEL]
+    led = lambda one: f", with {one.follows}" if one.independent < RESIDUAL_LEVEL else ""
     said = ", ".join(f"{c} ({rms[c]:.2g} σ{led(left[c])})" for c in found)
     return [f"Free runs through the held-out runs leave more than noise in {said}."] if found else []
 
@@ -85,14 +82,14 @@ def _interval(residual: Samples, measured: Bool[np.ndarray, "r k"]) -> tuple[flo
 
     Neighbours go together, so it is blocks that are independent. Source: Cochran (1977), Sampling Techniques, ch. 6.
     """
-    blocks = lambda of: np.concatenate([part.sum(axis=1) for part in np.array_split(of, LONG_BLOCKS, axis=1)])
+    blocks = lambda of: np.concatenate([part.sum(axis=1) for part in np.array_split(of, BLOCKS, axis=1)])
     squares, counts = blocks(residual**2), blocks(measured)
     squares, counts = squares[counts > 0], counts[counts > 0]
     mean, n = squares.sum() / counts.sum(), len(counts)
     if n < 2 or mean == 0.0:
         return (0.0, 0.0) if mean == 0.0 else (0.0, np.inf)
     error = np.sqrt(n / (n - 1) * np.sum((squares - mean * counts) ** 2)) / counts.sum()
-    spread = np.exp(0.5 * special.stdtrit(n - 1, _SURE) * error / mean)
+    spread = np.exp(0.5 * special.stdtrit(n - 1, 1.0 - LEVEL / 2.0) * error / mean)
     return float(np.sqrt(mean) / spread), float(np.sqrt(mean) * spread)
 
 
@@ -121,7 +118,7 @@ def correlation(
     a, b = there.astype(float), here.astype(float)
     pairs = np.maximum(np.round(_lagged(a, b, most)), 1.0)
     energy = _lagged(later**2, b, most) * _lagged(a, earlier**2, most)
-    return _lagged(later, earlier, most) / np.sqrt(np.maximum(energy, _TINY)), pairs
+    return _lagged(later, earlier, most) / np.sqrt(np.maximum(energy, 1e-300)), pairs
 
 
 def _lagged(later: np.ndarray, earlier: np.ndarray, most: int) -> Float[np.ndarray, " l"]:

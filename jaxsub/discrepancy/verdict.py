@@ -5,20 +5,13 @@ import math
 from collections.abc import Sequence
 
 from ..effects import AbstractEffect
-from .cross_validation import LEVEL, Comparison, Gain
+from .cross_validation import Comparison, Gain
 from .decisions import Decision
 from .diagnosis import Verdict
 from .generic import Pattern
 from .name import Named, Naming
-from .selector import SIGNIFICANCE
-from .whiteness import NOT_WHITE, Memory
-
-CERTAIN = 0.9
-# of a mismatch, the share that its cause explains
-EXPLAINED = 0.75
-# log evidence by which a force without a name must beat the names to stand instead of them
-_CLEARLY = 3.0
-_BEYOND_DOUBT = 1e-6
+from .settings import CERTAIN, CLEAR_LOG_BAYES, EXPLAINED, LEVEL, RESIDUAL_LEVEL, SIGNIFICANCE, UNEXPLAINED_LEVEL
+from .whiteness import Memory
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,7 +75,7 @@ def _tests(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory)
         test = "p-value of a nonparametric force, corrected for all tried"
         said.append(Decision(pattern.force.label, test, pattern.p_value, SIGNIFICANCE, outcome))
     outcome = "correlated" if memory.correlated else "white"
-    return [*said, Decision("mismatch", "p-value of white innovations", memory.p_value, NOT_WHITE, outcome)]
+    return [*said, Decision("mismatch", "p-value of white innovations", memory.p_value, RESIDUAL_LEVEL, outcome)]
 
 
 def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory) -> list[tuple[Decision, str]]:
@@ -95,7 +88,7 @@ def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory
     if pattern is not None:
         lead = pattern.alone - naming.value
         note = f"{labels} has the highest evidence in the vocabulary, and less than a nonparametric force alone."
-        tested("log evidence of a nonparametric force over theirs", lead, _CLEARLY, lead > _CLEARLY, note)
+        tested("log evidence of a nonparametric force over theirs", lead, CLEAR_LOG_BAYES, lead > CLEAR_LOG_BAYES, note)
     shares = {"a nonparametric force": pattern.explained} if pattern is not None else {}
     shares |= {"correlated innovations": memory.explained} if memory.correlated else {}
     for beside, share in shares.items():
@@ -182,7 +175,7 @@ def settled(judged: Judged, stand: list[Named]) -> Judged:
         return dataclasses.replace(judged, named=stand, verdict=_certainty(stand))
     if not judged.named:
         return judged
-    return dataclasses.replace(judged, verdict="unknown" if judged.p_value < _BEYOND_DOUBT else "none", named=[])
+    return dataclasses.replace(judged, verdict="unknown" if judged.p_value < UNEXPLAINED_LEVEL else "none", named=[])
 
 
 def _certainty(named: Sequence[Named]) -> Verdict:

@@ -24,18 +24,15 @@ from ..likelihood import (
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .leading import At, Led, apart, arrived, by_cost, of_order, settled, turned
+from .settings import BLOCKS, LARGE_ERROR
 from .tones import tones
 from .whiteness import record_sigma
 
-# rms over sigma of a channel, above which a fit is not trusted to have ended near the truth
-_MUCH = 2.0
 # of the channels that may alone be wrong, those that are tried
 _DOUBTED = 3
 # of the forces that would explain all that is left: too small to lead a path, and large enough to grow from
 _QUIET = 1e-2
 _LEAST_WHITE = 1e-5
-# parts of the recordings, each to be predicted from the others
-_PARTS = 4
 
 
 class Trajectory(eqx.Module):
@@ -112,7 +109,7 @@ class View:
         log-determinant of each part's covariance. Every run is cut into so many `pieces`, or so that there are four.
         """
         system = self.followed.system
-        pieces = pieces or max(1, -(-_PARTS // len(system.measured)))
+        pieces = pieces or max(1, -(-BLOCKS // len(system.measured)))
         found, spreads = part_products(disturbance, system, columns, pieces)
         return found.reshape(-1, *found.shape[2:]), spreads.reshape(-1)
 
@@ -139,7 +136,8 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     name it by.
     """
     problem, rms = of_order(fit.problem), fit.rms
-    much = max(rms.values()) > _MUCH
+    # such a fit is not trusted to have ended near the truth
+    much = max(rms.values()) > LARGE_ERROR
     led = Led(problem, problem.guess if much else fit.start)
     guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.spread), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
@@ -181,7 +179,7 @@ def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturb
     leaves much in, and in the others to forces: for each such.
     """
     noisy = np.maximum(guess.noise, rms)
-    alone = [np.where(own, noisy, guess.noise) for own in np.diag(rms > _MUCH) if own.any()]
+    alone = [np.where(own, noisy, guess.noise) for own in np.diag(rms > LARGE_ERROR) if own.any()]
     every = Disturbance(_QUIET * np.asarray(guess.force), guess.time, noisy)
     return every, [dataclasses.replace(guess, noise=noise) for noise in alone]
 

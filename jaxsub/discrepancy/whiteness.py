@@ -6,9 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..likelihood.whiteness import portmanteau, remembered
-
-# probability below which innovations are not white
-NOT_WHITE = 1e-3
+from .settings import RESIDUAL_LEVEL
 
 
 class Memory(NamedTuple):
@@ -28,7 +26,7 @@ class Memory(NamedTuple):
     @property
     def correlated(self) -> bool:
         """Whether they are not."""
-        return self.p_value < NOT_WHITE
+        return self.p_value < RESIDUAL_LEVEL
 
 
 RANDOM = Memory(1.0, 1.0)

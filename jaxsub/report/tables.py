@@ -9,7 +9,7 @@ import tomlkit
 from markupsafe import Markup
 
 from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location, Regime, Remainder
-from ..discrepancy.validation import CHANCE
+from ..discrepancy.settings import RESIDUAL_LEVEL
 from ..findings import Finding
 from .text import UNKNOWN, formula, number, p_value, ratio, symbol, unit
 
@@ -180,11 +180,11 @@ def _between(left: Remainder) -> CheckCell:
 
 
 def _random(left: Remainder) -> CheckCell:
-    return CheckCell(p_value(left.random), left.random < CHANCE)
+    return CheckCell(p_value(left.random), left.random < RESIDUAL_LEVEL)
 
 
 def _follows(left: Remainder) -> CheckCell:
-    flagged = left.independent < CHANCE
+    flagged = left.independent < RESIDUAL_LEVEL
     return CheckCell(p_value(left.independent) + (f" ({left.follows})" if flagged else ""), flagged)
 
 

@@ -9,7 +9,7 @@ from rigs import oscillator
 
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.ahead import Ahead, in_pieces, lacking, pieces_of
-from jaxsub.discrepancy.cross_validation import LONG_BLOCKS, Predicted, one_step_ahead
+from jaxsub.discrepancy.cross_validation import Predicted, one_step_ahead
 from jaxsub.discrepancy.evaluation import evaluated
 from jaxsub.discrepancy.evidence import evidence_of
 from jaxsub.discrepancy.examine import listed
@@ -17,6 +17,7 @@ from jaxsub.discrepancy.leading import Led, of_order
 from jaxsub.discrepancy.many import asked_for, by_what_comes_next
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.restarts import restarted
+from jaxsub.discrepancy.settings import BLOCKS
 from jaxsub.discrepancy.trial import Model, Trial
 from jaxsub.discrepancy.view import led_from
 from jaxsub.effects import CubicStiffness, numbers
@@ -148,7 +149,7 @@ def begun():
     view = led_from(file, train, SIGMA, [dataclasses.replace(STILL, force=jnp.array([1.0]))])
     start, cost = initial_guess(view.vehicle, train)[0], jnp.asarray(-evidence_of(view))
     fit = Ended(view.vehicle, train, start, SIGMA, cost, jnp.asarray(0), RESULTS.nan_start)
-    lost = Predicted(one_step_ahead(view), np.full(2 * LONG_BLOCKS, -np.inf))
+    lost = Predicted(one_step_ahead(view), np.full(2 * BLOCKS, -np.inf))
     return Trial(lambda message: None, file), Model(fit, view, lost, ())
 
 

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jaxsub.discrepancy.consistency import FAR, assessed, compared, consistent
+from jaxsub.discrepancy.consistency import assessed, compared, consistent
 from jaxsub.discrepancy.diagnosis import ChannelQuality, Explained, Location, Physics, Remainder
+from jaxsub.discrepancy.settings import LARGE_ERROR
 from jaxsub.discrepancy.summary import summary
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.plain import finite_text, to_json
@@ -58,7 +59,7 @@ def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
     """Claim: with any channel's interval above 2 σ the verdict is unknown, with the reason; else it is left alone."""
     found, remains, assessment = explained((v, psi), (v, psi))
     judged = consistent(Judged("none", [], p_value, ["said"]), found, remains, assessment)
-    far = [c for c in CHANNELS if remains[c].low > FAR]
+    far = [c for c in CHANNELS if remains[c].low > LARGE_ERROR]
     assert judged.verdict == ("unknown" if far else "none")
     assert judged.notes[0] == "said" and judged.p_value == (min(p_value, assessment.size) if far else p_value)
     assert all(f"σ in {channel}" in judged.notes[-1] for channel in far)

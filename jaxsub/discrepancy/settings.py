@@ -1,0 +1,157 @@
+"""Every constant that a decision of a diagnosis depends on, in the order of its steps.
+
+Shares are of one, levels are of p-values, and scores are $\\chi^2$. What only bounds rounding errors or the time that a
+search takes stands where it is used.
+"""
+
+from typing import Final
+
+# Filter and disturbance
+
+# rms of a residual over σ above which it is far above the noise
+LARGE_ERROR: Final[float] = 2.0
+# prior standard deviation of a coefficient, or of a filter's initial state, that has none, in units of its size
+PRIOR_WIDTH: Final[float] = 10.0
+# disturbances under which evidence is computed, of the one estimated without candidates, which holds what is missing
+DISTURBANCE_SHARES: Final[tuple[float, ...]] = (1.0, 0.1, 0.003)
+# what counts as zero: of a simulation's disturbance, as a share of the estimated one; of a shape such as a lag, SI
+NEGLIGIBLE: Final[float] = 1e-6
+
+# Candidates and evidence
+
+# level at which a candidate, a force (both corrected for all tried) or a fitted amplitude is significant
+SIGNIFICANCE: Final[float] = 0.01
+# share of a candidate's sensitivity that the free parameters must leave for it to be identifiable
+IDENTIFIABLE_SHARE: Final[float] = 1e-4
+# score from which a sensor error must be smaller than what the sensor shows
+PLAUSIBILITY_SCORE: Final[float] = 10.0
+# spectral peaks of the missing force that become candidate wave frequencies, in each equation
+TONES: Final[int] = 4
+# independent frequencies on each side of a peak whose median is its background
+TONE_BACKGROUND: Final[int] = 8
+# score of a wave from which its frequency is refined
+TONE_SCORE: Final[float] = 25.0
+# nonparametric forces in each equation whose evidence is computed
+FORCES_PER_EQUATION: Final[int] = 3
+# ridge of the regression that picks these forces, in samples at each knot
+FORCE_RIDGE: Final[float] = 0.5
+# disturbances under which a nonparametric force is sought, of those estimated without and with the chosen effects
+FORCE_DISTURBANCE_SHARES: Final[tuple[float, ...]] = (1.0, 0.1, 0.01)
+# length scales of a nonparametric force, of the range of its variable
+LENGTH_SCALES: Final[tuple[float, ...]] = (1 / 3, 1 / 10, 1 / 30)
+
+# Structure search
+
+# most effects that one selection takes
+MOST_EFFECTS: Final[int] = 4
+# most effects that a search on innovations takes
+MOST_EFFECTS_ONE_STEP: Final[int] = 16
+# most sensitivity columns of the effects that one selection takes, for which the disturbance's program has room
+MOST_COLUMNS: Final[int] = 8
+# rejected sets of effects after which others are tried once more
+MOST_REJECTIONS: Final[int] = 2
+# disturbances estimated for the leading candidates of one step
+DISTURBANCE_ESTIMATES: Final[int] = 3
+# rivals of an effect that are fitted in its place
+RIVALS_FITTED: Final[int] = 2
+# log Bayes factor from which one explanation is clearly better than another
+CLEAR_LOG_BAYES: Final[float] = 3.0
+# log Bayes factor by which the leading candidate may be worse than none and its own disturbance is still estimated
+ESTIMATED_LOG_BAYES: Final[float] = 5.0
+# the larger share of a variance or score: above it something explains, or keeps, most
+MAJORITY: Final[float] = 0.5
+# relative error of a score by linearisation, over the root of the share that the free parameters leave
+SCORE_ERROR: Final[float] = 0.03
+# largest relative error of a score by linearisation
+MOST_SCORE_ERROR: Final[float] = 0.3
+# share of the squared simulation error at or below which the best candidate gives way to one of a major share
+MINOR_SHARE: Final[float] = 0.02
+# share of the squared simulation error above which a candidate is preferred to one of a minor share
+MAJOR_SHARE: Final[float] = 0.2
+# ratio of squared simulation errors, explained or left, within which a candidate may replace one that simulation chose
+SIMULATION_RATIO: Final[float] = 2.0
+# squared simulation error that a chosen effect may leave, in units of what the best nonparametric force leaves
+FORCE_RATIO: Final[float] = 4.0
+# share of the log evidence gained by a set from which its best effect is first fitted by itself
+DOMINANT_SHARE: Final[float] = 0.9
+# share of an effect's log evidence that the linearised model without it may fail to restore
+LINEARISATION_LOSS: Final[float] = 0.1
+
+# Acceptance
+
+# level of one test: that a model predicts better or worse, of a filter's alarm, of a regime; and of confidence bounds
+LEVEL: Final[float] = 0.05
+# blocks of each run that the others predict, by simulation; and at least of all runs where candidates are proposed
+BLOCKS: Final[int] = 4
+# blocks of each run that the others predict, one step ahead: innovations are correlated for less long
+BLOCKS_ONE_STEP: Final[int] = 24
+# most parts into which a run of an unstable model is cut for simulation
+MOST_RESTARTS: Final[int] = 64
+# fewest samples of such a part
+FEWEST_SAMPLES: Final[int] = 8
+# share of a channel's variance that simulation of these parts may leave
+RESTART_ERROR: Final[float] = 0.1
+# sets of surrogate terms that are fitted in one round
+SURROGATE_FITS: Final[int] = 5
+# rounds in which surrogate terms are added
+SURROGATE_ROUNDS: Final[int] = 3
+# share of the squared simulation error that surrogate terms must remove
+SURROGATE_GAIN: Final[float] = 0.01
+# growth of a named effect's standard error beside surrogate terms from which it keeps its value
+SURROGATE_INFLATION: Final[float] = 2.0
+# prior standard deviations of a nonparametric force that are tried, of the one with the highest evidence
+FORCE_SPREADS: Final[tuple[float, ...]] = (1.0, 0.5, 0.25)
+
+# Verdict
+
+# posterior probability from which an effect is named and not ambiguous
+CERTAIN: Final[float] = 0.9
+# posterior probability above which another effect is a rival
+RIVAL_PROBABILITY: Final[float] = 0.02
+# share of the mismatch that effects must explain to be its cause
+EXPLAINED: Final[float] = 0.75
+# level at which residuals are correlated in time, or with an input
+RESIDUAL_LEVEL: Final[float] = 1e-3
+# level at which a mismatch is unknown, and not none, where every effect was rejected
+UNEXPLAINED_LEVEL: Final[float] = 1e-6
+
+# Location
+
+# share of the mismatch that a place, or one surrogate term, must hold
+PLACE_SHARE: Final[float] = 0.05
+# missing force over its standard deviation from which it is significant
+FORCE_SIGMAS: Final[float] = 2.5
+# the same where the filter's process noise rises too
+SUPPORTED_FORCE_SIGMAS: Final[float] = 1.5
+# gap between significant intervals that are one, of the run
+INTERVAL_GAP: Final[float] = 0.02
+# most variables that are listed as those a force grows with
+GROWTH_VARIABLES: Final[int] = 3
+# score of such a variable, of the best one's
+GROWTH_RATIO: Final[float] = 0.8
+# least score of such a variable
+GROWTH_SCORE: Final[float] = 4.0
+# area under the curve (Mann and Whitney) from which a variable marks a regime
+REGIME_AREA: Final[float] = 0.75
+# share of the samples that must lie inside and outside a regime's intervals
+REGIME_SHARE: Final[float] = 0.01
+# constant process noise of the location filter, sensors' σ per root second: with less its uncertainty is slow to
+# follow, with more it corrects so much at once that a small force drowns in the sensors' noise
+NOISE_FLOOR: Final[float] = 0.1
+# least and most of the process noise on top of it, in the same unit
+NOISE_RANGE: Final[tuple[float, float]] = (1e-4, 10.0)
+# samples over which the process noise is averaged
+NOISE_WINDOW: Final[int] = 50
+
+# Report
+
+# standard error over a coefficient's size from which it is weakly identified
+WEAK_ERROR: Final[float] = 0.5
+# standard error over a coefficient's size from which it is not excited
+UNEXCITED_ERROR: Final[float] = 5.0
+# correlation of two estimates from which it is reported
+CORRELATED: Final[float] = 0.9
+# rms of a filtered disturbance force over its estimated standard deviation above which it is reported
+REPORTED_DISTURBANCE: Final[float] = 0.3
+# rivals or channels that a sentence or table lists
+LISTED: Final[int] = 4
