@@ -12,15 +12,19 @@ from . import terminal
 
 # samples from which on a command says what it will take
 _LONG = 100_000
-# `identify` on 1 000 000 rows, jax 0.12, two cores of a shared machine, November 2026: one coordinate 1.01 GB and 30 s
-# of CPU from an empty cache, 0.74 GB and 19 s again; six degrees of freedom, 16 coefficients, 10 channels: 1.25 GB.
-# bytes of the program and its compiler, copies of the recording's columns, and copies of the Jacobian of what is
-# linearised at once: a block, or with actuators or sensors that remember all of it
-_BASE, _COPIES, _OF_JACOBIAN = 9.0e8, 4, 2.5
-# s for programs to be compiled, and for each sample, state and column of the Jacobian in a pass: 0.14 and 0.11 µs
-_COMPILE, _EACH = 20.0, 1.2e-7
-# passes over the samples: six of a usual search, one for the statistics, two for what follows
-_PASSES = 9
+# `identify` on 100 000 rows, jax 0.12, two cores of a shared machine, November 2026, from an empty cache of programs
+# and again: one coordinate, 3 coefficients, 17 s and 6 s of CPU, 0.82 GB and 0.53 GB; six degrees of freedom, 20
+# coefficients that begin 10 to 15 % off, 10 channels, 18 passes: 170 s and 119 s, 1.39 GB and 0.96 GB.
+# bytes of the program, its compiler and the windows of coloured errors, copies of the recording's columns, and copies
+# of the Jacobian of what is linearised at once: a block, or with actuators or sensors that remember all of it
+_BASE, _COPIES, _OF_JACOBIAN = 1.0e9, 4, 2.5
+# s before and after the passes with programs in the cache and without, each and for each column of the Jacobian
+_KEPT, _COMPILED = (1.8, 0.4), (4.8, 1.5)
+# s for each sample, state and column of the Jacobian in a pass
+_EACH = 1.2e-7
+# passes over the samples, and for each coefficient: those of a search, one for the statistics, two for what follows.
+# a search whose coefficients the runs hardly tell apart takes up to three times as many
+_PASSES, _OF_COEFFICIENT = 7, 0.65
 
 # s in which nothing is said of the time left, and between two lines, on a terminal and on a pipe; and the share of a
 # pass that tells how long the others will take
@@ -46,7 +50,8 @@ class Effort:
         layout = vehicle.layout
         self._samples, self._channels, self._states = runs.times.size, len(layout.channels), len(layout.states)
         self._recorded = 1 + runs.signals.shape[-1] + self._channels
-        self._columns = len(layout.free) + self._states + 2 * len(layout.equations)
+        self._coefficients = len(layout.free)
+        self._columns = self._coefficients + self._states + 2 * len(layout.equations)
         self._at_once = block_length(vehicle, runs) * len(runs.times)
 
     def announcement(self) -> str:
@@ -55,9 +60,12 @@ class Effort:
             return ""
         jacobian = _OF_JACOBIAN * self._at_once * self._columns * (self._states + self._channels)
         memory = (_BASE + 8.0 * (_COPIES * self._samples * self._recorded + jacobian)) / 1e9
-        seconds = _COMPILE + _PASSES * _EACH * self._samples * self._columns * self._states
+        passes = _PASSES + _OF_COEFFICIENT * self._coefficients
+        passing = passes * _EACH * self._samples * self._columns * self._states
+        least, most = (passing + fixed + each * self._columns for fixed, each in (_KEPT, _COMPILED))
         size = f"{self._samples} samples of {self._channels} channels"
-        return f"{size}: takes about {memory:.1f} GB and {_span(seconds)}; Ctrl-C after the fit keeps the fit"
+        time = f"{_span(least)}, {_span(most)} the first time"
+        return f"{size}: takes about {memory:.1f} GB and {time}; Ctrl-C after the fit keeps the fit"
 
 
 class TimeLeft:

@@ -33,11 +33,13 @@ from ..likelihood import (
     carried_to_start,
     first_guess,
     nobody,
+    padded_width,
 )
 from ..recording.runs import Runs
 
-# samples that the disturbance of long runs is estimated from: its few numbers gain nothing from more
-_WINDOWS, _LENGTH = 8, 2500
+# samples that the disturbance of long runs is estimated from: its few numbers gain nothing from more; and of what a
+# filter carries along them, states and forces times columns, which its gradient keeps several times: 0.4 GB in all
+_WINDOWS, _LENGTH, _CARRIED = 8, 2500, 3_000_000
 
 
 class Coloured(eqx.Module):
@@ -151,14 +153,16 @@ def _sandwich(reduced: _Reduced, disturbance: Disturbance, adjoint: Adjoint) -> 
 
 
 def _windows(model: BlockLinearised) -> tuple[Runs, Linearised]:
-    """All of it where that is one block, else `_WINDOWS` windows of `_LENGTH` samples from where blocks begin."""
+    """All of it where that is one block, else windows of `_LENGTH` samples from where blocks begin."""
     if model.only is not None:
         return model.runs, model.only
     count, samples = model.runs.times.shape
-    length = min(samples, _LENGTH)
-    chosen = np.linspace(0, count - 1, min(count, _WINDOWS)).round().astype(int)
+    length, layout = min(samples, _LENGTH), model.vehicle.layout
+    carried = (len(layout.states) + len(layout.equations)) * padded_width(1 + len(layout.free))
+    windows = min(_WINDOWS, max(1, _CARRIED // (length * carried)))
+    chosen = np.linspace(0, count - 1, min(count, windows)).round().astype(int)
     latest = (samples - length) // model.length
-    firsts = np.linspace(0, latest, min(latest + 1, max(1, _WINDOWS // len(chosen)))).round().astype(int)
+    firsts = np.linspace(0, latest, min(latest + 1, max(1, windows // len(chosen)))).round().astype(int)
     parts = [model.window(first, chosen, length) for first in firsts.tolist()]
     arrays = ("times", "step_of", "live", "signals", "outputs", "mask")
     whole = lambda *pieces: jnp.asarray(np.concatenate(pieces))
