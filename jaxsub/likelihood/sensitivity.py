@@ -113,7 +113,10 @@ def jacobians(
     pushes = jnp.zeros((r, k1, 2, n)) if push is None else push.reshape(r, k1, 2, n)
     by_nodes = jnp.moveaxis(by_nodes, 0, 2)
     samples = tuple(map(flat, (before, nodes, by_nodes, runs.step_of, pushes)))
-    columns = jax.lax.map(stepped, samples, batch_size=_SIDE_BY_SIDE)
+    # a remainder would be compiled apart, in as much time again
+    whole = -(-r * k1 // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
+    samples = jax.tree.map(lambda a: jnp.pad(a, [(0, whole - r * k1), *[(0, 0)] * (a.ndim - 1)], mode="edge"), samples)
+    columns = jax.lax.map(stepped, samples, batch_size=_SIDE_BY_SIDE)[: r * k1]
 
     def shown(change: Array) -> Array:
         parameters, moved = jnp.split(change, [p])
