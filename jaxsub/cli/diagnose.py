@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rich.panel import Panel
@@ -10,8 +11,10 @@ from rich.text import Text
 from ..discrepancy import Diagnosis
 from ..discrepancy import diagnose as diagnose_runs
 from ..discrepancy.decisions import decision_rows
+from ..discrepancy.diagnose import Keep
 from ..discrepancy.next_run import next_run, said
 from ..effects import AbstractEffect, from_script, vocabulary
+from ..errors import OutputError
 from ..estimate import require_free
 from ..plain import to_json
 from ..recording import Recording, hold_out, save
@@ -19,7 +22,8 @@ from ..report import write_report
 from ..report.text import measurement, percent, ratio, unit
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
 from . import session, terminal
-from .output import fresh_folder, paths_of
+from .options import options
+from .output import Fresh, fresh_folders, paths_of
 from .runs import load_train_and_test
 
 _NEXT = "next_manoeuvre.csv"
@@ -40,21 +44,34 @@ def run(
     """Diagnose the recordings at `runs`, shown on the test runs at `held` or on what `hold_out` sets aside.
 
     Effects that the Python file at `script` defines are tried with those that are installed. Of logs the file at
-    `columns` says what to take. `explain` prints every decision. After `budget` seconds the answer so
-    far is given.
+    `columns` says what to take. `explain` prints every decision. After `budget` seconds, or at Ctrl-C, the answer so
+    far is given. It is put at `out` after each effect that is accepted, and stays there whatever ends what follows.
     """
     session.start()
-    with fresh_folder(out, overwrite, paths_of(vehicle_path, *runs, *held, script, columns)) as folder:
+    with fresh_folders(out, overwrite, paths_of(vehicle_path, *runs, *held, script, columns)) as fresh:
         own = () if script is None else from_script(script)
         vehicle = read_vehicle(vehicle_path, own)
         require_free(vehicle, str(vehicle_path))
         recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
         train, test = (recordings, unseen) if held else hold_out(recordings)
-        answer = diagnosed(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget)
+        keep = lambda diagnosis, improved: _keep(Answer(diagnosis, improved, None), fresh, out)
+        answer = diagnosed(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget, keep)
         # shown before it is written: where writing fails, minutes of work are not lost
         answer.emit(explain)
-        answer.write(folder)
+        with fresh() as folder:
+            answer.write(folder)
     terminal.note(f"report: {out / 'report.html'}")
+    if not answer.diagnosis.complete and (watch := options().watch) is not None and watch.interrupted:
+        options().kept = f"{out} holds the answer so far, which is incomplete"
+        raise KeyboardInterrupt
+
+
+def _keep(answer: "Answer", fresh: Fresh, out: Path) -> None:
+    """Put an answer on the way at `out`. Where it cannot be written, the command says so with the last one."""
+    with suppress(OutputError):
+        with fresh() as folder:
+            answer.write_numbers(folder)
+        options().kept = f"{out} holds the answer{'' if answer.diagnosis.complete else ' so far, which is incomplete'}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,13 +88,18 @@ class Answer:
 
     def write(self, folder: Path) -> None:
         """Write `diagnosis.json`, `improved.toml`, `report.html`, `figures/` and `next_manoeuvre.csv` into `folder`."""
+        text = self.write_numbers(folder)
+        if self.next_run is not None:
+            save(self.next_run, folder / _NEXT)
+        write_report(self.diagnosis, text, folder)
+
+    def write_numbers(self, folder: Path) -> str:
+        """Write `diagnosis.json` and `improved.toml` alone; returns the latter's text."""
         diagnosis = self.diagnosis
         text = vehicle_text(self.improved, f"{diagnosis.vehicle}, improved by jaxsub\n{diagnosis.summary}")
         (folder / "improved.toml").write_text(text, encoding="utf-8")
         (folder / "diagnosis.json").write_text(to_json(diagnosis.to_json()), encoding="utf-8")
-        if self.next_run is not None:
-            save(self.next_run, folder / _NEXT)
-        write_report(diagnosis, text, folder)
+        return text
 
 
 def diagnosed(
@@ -87,16 +109,30 @@ def diagnosed(
     kinds: tuple[type[AbstractEffect], ...] | None = None,
     manoeuvre: bool = True,
     budget: float | None = None,
+    keep: Keep = lambda diagnosis, improved: None,
 ) -> Answer:
     """Diagnose `vehicle` by the runs `train`, shown on `test`, trying effects of `kinds`: all installed where None.
 
     Where rivals remain and a `manoeuvre` is wanted, inputs that would tell them apart are looked for. After `budget`
-    seconds no further effect is tried.
+    seconds, or once interrupted, no further effect is tried. Each answer on the way is given to `keep`.
     """
-    with terminal.progress(f"diagnosing {vehicle.layout.name}") as told:
-        diagnosis, improved = diagnose_runs(vehicle, train, test, vocabulary=kinds, progress=told, budget=budget)
+    watch = options().watch
+    with terminal.progress(f"diagnosing {vehicle.layout.name}") as told, ExitStack() as kept:
+
+        def keep_and_heed(diagnosis: Diagnosis, improved: AbstractVehicle) -> None:
+            keep(diagnosis, improved)
+            # before there is an answer an interruption ends all at once
+            if watch is not None:
+                kept.enter_context(watch.heeded())
+
+        stop = lambda: watch is not None and watch.interrupted
+        diagnosis, improved = diagnose_runs(
+            vehicle, train, test, vocabulary=kinds, progress=told, budget=budget, stop=stop, keep=keep_and_heed
+        )
+        kept.close()
         if not (manoeuvre and diagnosis.explanations and diagnosis.complete):
             return Answer(diagnosis, improved, None)
+        keep(diagnosis, improved)
         told("looking for the manoeuvre that would settle it")
         found = next_run(diagnosis, train)
         if found is None:

@@ -47,7 +47,7 @@ def run(
         vehicle = read_vehicle(vehicle_path)
         require_free(vehicle, str(vehicle_path))
         recordings = load_runs(runs, vehicle, columns)
-        stacked = batch(vehicle, recordings)
+        stacked = batch(vehicle, recordings).padded()
         del recordings
         effort = Effort(vehicle, stacked)
         if announcement := effort.announcement():

@@ -12,7 +12,7 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
@@ -33,11 +33,11 @@ class Watch:
     """While the block runs, the first SIGINT or SIGTERM raises `KeyboardInterrupt` in the main thread.
 
     A process that has not left the block `GRACE` seconds later, or gets a second signal, is ended with exit code 130.
-    `message` is what it then says on standard error.
+    `message` is what it then says on standard error. Where the signal is `heeded` it is `interrupted` and goes on.
     """
 
     def __init__(self, message: Callable[[], str]):
-        self._message, self._interrupted = message, False
+        self._message, self.interrupted, self._heed = message, False, False
         self._handlers: dict[int, Any] = {}
         self._terminal = _CLOSED_FILE
         self._word, self._spoken = threading.Lock(), False
@@ -67,6 +67,15 @@ class Watch:
         """Let the command go on after the first signal, to keep what it has; a second one still ends it."""
         self._write.send(_ANSWERED)
 
+    @contextlib.contextmanager
+    def heeded(self) -> Iterator[None]:
+        """A block that looks at `interrupted` by itself and ends soon after the first signal; a second one ends all."""
+        self._heed = True
+        try:
+            yield
+        finally:
+            self._heed = False
+
     def last_word(self, say: Callable[[], object]) -> None:
         """`say()`, unless the process has said its last word, as the watching thread may while this one ends."""
         with self._word:
@@ -76,9 +85,10 @@ class Watch:
 
     def _interrupt(self, *_: object) -> None:
         # a second one would break off what answers the first
-        if not self._interrupted:
-            self._interrupted = True
-            raise KeyboardInterrupt
+        if not self.interrupted:
+            self.interrupted = True
+            if not self._heed:
+                raise KeyboardInterrupt
 
     def _wait(self) -> None:
         """End the process when it is due, unless the block ends before."""
@@ -97,7 +107,7 @@ class Watch:
                     if interrupted:
                         break
                     interrupted = True
-                    signals.settimeout(GRACE)
+                    signals.settimeout(None if self._heed else GRACE)
         abandon()
         self.last_word(self._say)
         leave(INTERRUPTED)

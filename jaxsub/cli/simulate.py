@@ -54,7 +54,7 @@ def simulated(
     **Raises** `InputError` where the model diverges, and as `initial_state` does.
     """
     with terminal.progress(f"simulating {vehicle.layout.name}"):
-        runs = batch(vehicle, [recording])
+        runs = batch(vehicle, [recording]).padded()
         began, state, findings = initial_state(vehicle, runs, recording, start)
         shown = predict(vehicle, runs, state[None])
     if not np.all(np.isfinite(np.asarray(shown))):
@@ -75,7 +75,7 @@ def simulated(
         "warnings": [finding.to_json() for finding in (*known, *recording.findings, *findings)],
     }
     terminal.emit(content, lambda: show(began, content["initial_state"], fit))
-    return np.asarray(shown)[0]
+    return np.asarray(shown)[0, : len(recording.times)]
 
 
 def with_every_channel(recording: Recording, vehicle: AbstractVehicle) -> Recording:

@@ -1,7 +1,7 @@
 """The whole path: fit, locate, name, model, show."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,9 +15,9 @@ from ..vehicle import AbstractVehicle, vehicle_findings
 from .advice import next_manoeuvre
 from .ahead import in_pieces
 from .batch import batch
-from .consistency import assessed, compared, consistent
+from .consistency import consistent
 from .diagnosis import Candidate, Diagnosis, Location, Physics, Rival
-from .evaluation import evaluated, overlays, test_gain
+from .evaluation import overlays
 from .examine import examine
 from .explain import explained
 from .kinds import leading, missing, right
@@ -28,12 +28,17 @@ from .process_noise import noise_note, noise_signals
 from .progress import Progress, limited
 from .settings import LISTED, REPORTED_DISTURBANCE, RIVALS_FITTED
 from .show import channel_quality, coefficients, estimates, run_quality, trades
+from .shown import shown_on
 from .stand_in import described
 from .summary import summary
 from .trial import Found, Model, Trial, fitted_model
-from .validation import beyond_noise, remainders
+from .validation import beyond_noise
 from .verdict import Judged
 from .view import View, look
+
+
+# told each answer before the last: the diagnosis, which is not `complete`, and the improved vehicle
+Keep = Callable[[Diagnosis, AbstractVehicle], object]
 
 
 def diagnose(
@@ -44,18 +49,21 @@ def diagnose(
     vocabulary: tuple[type[AbstractEffect], ...] | None = None,
     progress: Progress = lambda message: None,
     budget: float | None = None,
+    stop: Callable[[], bool] = lambda: False,
+    keep: Keep = lambda diagnosis, improved: None,
 ) -> tuple[Diagnosis, AbstractVehicle]:
     """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `test`.
 
     Nothing of the runs `test` takes part in a decision: the models are simulated along them once, at the end. Returns
     the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` is told what is
-    being done. After `budget` seconds no further effect is tried, and the answer so far is given, which then is not
-    `complete`. **Raises** `InputError` where the recordings lack a column, or the model does not run from the
-    vehicle file's values or diverges along the recordings.
+    being done. After `budget` seconds, or once `stop()` is true, no further effect is tried, and the answer so far is
+    given, which then is not `complete`. Each answer on the way is given to `keep`: one more effect was accepted, and
+    the test runs were not looked at yet. **Raises** `InputError` where the recordings lack a column, or the model does
+    not run from the vehicle file's values or diverges along the recordings.
     """
-    until = limited(progress, budget)
+    until = limited(progress, budget, stop)
     progress("fitting the baseline")
-    start = fit(vehicle, batch(vehicle, train))
+    start = fit(vehicle, batch(vehicle, train).padded())
     if bool(start.result == RESULTS.nan_start):
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
         raise InputError(vehicle.layout.name, "the model does not run from its starting values", remedy)
@@ -67,81 +75,83 @@ def diagnose(
     found = examine(view, vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
+    account = _Account(vehicle, train, found, field)
     trial, baseline = Trial(until, vehicle), fitted_model(start, found.view, ())
-    named, judged, left = explained(trial, baseline, found, vocabulary)
+    so_far = lambda model, judged: keep(*account.of(baseline, model, model, judged, ()))
+    named, judged, left = explained(trial, baseline, found, vocabulary, so_far)
     best, judged = (named, judged) if left is None else described(trial, named, left, judged, vocabulary)
     if best.pieces > 1:
         baseline = in_pieces(baseline, best.pieces)
     progress("simulating the test runs")
-    return _told(vehicle, train, test, found, field, baseline, named, best, judged)
+    return account.of(baseline, named, best, judged, test)
 
 
-def _told(
-    vehicle: AbstractVehicle,
-    train: Sequence[Recording],
-    test: Sequence[Recording],
-    first: Found,
-    field: Field,
-    baseline: Model,
-    named: Model,
-    best: Model,
-    judged: Judged,
-) -> tuple[Diagnosis, AbstractVehicle]:
-    """The diagnosis, and the improved vehicle: the `best` model, of which the `named` one has the numbers of names."""
-    layout = vehicle.layout
-    before, *rest = evaluated(vehicle, train, test, [baseline, best] if best.added else [baseline], best.pieces)
-    after = rest[0] if rest else before
-    start = allowing_for(baseline.view, baseline.fit)
-    improved = allowing_for(best.view, best.fit) if best.added else start
-    sigma = np.asarray(start.sigma)
-    standing = best.added[len(named.added) :]
-    models = [("baseline", before), *([("improved", after)] if best.added else [])]
-    remains = {label: remainders(shown.error, test, layout, sigma) for label, shown in models}
-    channels = channel_quality(improved)
-    assessment = assessed(after.error, test, layout.channels, sigma)
-    found = compared(before.rms, after.rms, remains["baseline"], channels, assessment)
-    judged = consistent(judged, found, remains[models[-1][0]], assessment)
-    where = _where(judged, first, field, train)
-    own = improved if named is best else allowing_for(named.view, named.fit)
-    physics = [_physics(one, own) for one in judged.named]
-    in_units = lambda rms: {c: value * float(s) for (c, value), s in zip(rms.items(), sigma, strict=True)}
-    diagnosis = Diagnosis(
-        verdict=judged.verdict,
-        vehicle=layout.name,
-        summary=summary(judged.verdict, physics, where, standing, found, judged.p_value),
-        p_value=judged.p_value,
-        where=where,
-        physics=physics,
-        fit={
-            "train": {"baseline": start.rms, "improved": improved.rms},
-            "held_out": {"baseline": before.rms, "improved": after.rms},
-        },
-        candidates=_became(first.naming.candidates, physics, standing),
-        forces=field.traces,
-        remaining_forces=traces(best.view, train) if best.added else field.traces,
-        overlays=overlays(test, layout.channels, before, after),
-        coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, start, improved),
-        channels=channels,
-        runs=[*run_quality(train, "train"), *run_quality(test, "held out")],
-        notes=[
-            *judged.notes,
-            *disturbance_note(best.view),
-            *noise_note(field.signals),
-            *beyond_noise(remains[models[-1][0]], after.rms, layout),
-        ],
-        next_manoeuvre=next_manoeuvre(judged.verdict, physics),
-        kinds=missing(judged.named) if judged.named else leading(first),
-        file_p_value=right(best.view, vehicle),
-        remains=remains,
-        gain=test_gain(before, after, best.pieces) if best.added else None,
-        history=[(label, in_units(shown.rms)) for label, shown in models],
-        explanations=_explanations(judged, improved.vehicle),
-        explained=found,
-        findings=_findings(vehicle, [*train, *test]),
-        decisions=judged.decisions,
-        complete=judged.complete,
-    )
-    return diagnosis, improved.vehicle
+@dataclasses.dataclass(frozen=True)
+class _Account:
+    """How an answer is put together: the vehicle, its training runs, and the first look at them."""
+
+    vehicle: AbstractVehicle
+    train: Sequence[Recording]
+    first: Found
+    field: Field
+
+    def of(
+        self, baseline: Model, named: Model, best: Model, judged: Judged, test: Sequence[Recording]
+    ) -> tuple[Diagnosis, AbstractVehicle]:
+        """The diagnosis, and the improved vehicle: the `best` model, of which the `named` one has the numbers of names.
+
+        Without a `test` run nothing is shown of any.
+        """
+        vehicle, train, field, layout = self.vehicle, self.train, self.field, self.vehicle.layout
+        start = allowing_for(baseline.view, baseline.fit)
+        improved = allowing_for(best.view, best.fit) if best.added else start
+        sigma = np.asarray(start.sigma)
+        standing = best.added[len(named.added) :]
+        channels = channel_quality(improved)
+        shown = shown_on(test, vehicle, train, [baseline, best] if best.added else [baseline], channels)
+        if shown is not None:
+            judged = consistent(judged, shown.explained, shown.left, shown.assessment)
+        where = _where(judged, self.first, field, train)
+        own = improved if named is best else allowing_for(named.view, named.fit)
+        physics = [_physics(one, own) for one in judged.named]
+        found = None if shown is None else shown.explained
+        diagnosis = Diagnosis(
+            verdict=judged.verdict,
+            vehicle=layout.name,
+            summary=summary(judged.verdict, physics, where, standing, found, judged.p_value),
+            p_value=judged.p_value,
+            where=where,
+            physics=physics,
+            fit={
+                "train": {"baseline": start.rms, "improved": improved.rms},
+                "held_out": {} if shown is None else {"baseline": shown.before.rms, "improved": shown.after.rms},
+            },
+            candidates=_became(self.first.naming.candidates, physics, standing),
+            forces=field.traces,
+            remaining_forces=traces(best.view, train) if best.added else field.traces,
+            overlays=[] if shown is None else overlays(test, layout.channels, shown.before, shown.after),
+            coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, start, improved),
+            channels=channels,
+            runs=[*run_quality(train, "train"), *run_quality(test, "held out")],
+            notes=[
+                *judged.notes,
+                *disturbance_note(best.view),
+                *noise_note(field.signals),
+                *([] if shown is None else beyond_noise(shown.left, shown.after.rms, layout)),
+            ],
+            next_manoeuvre=next_manoeuvre(judged.verdict, physics),
+            kinds=missing(judged.named) if judged.named else leading(self.first),
+            file_p_value=right(best.view, vehicle),
+            remains={} if shown is None else shown.remains,
+            gain=None if shown is None else shown.gain,
+            history=[] if shown is None else shown.history(sigma),
+            explanations=_explanations(judged, improved.vehicle),
+            explained=found,
+            findings=_findings(vehicle, [*train, *test]),
+            decisions=judged.decisions,
+            complete=judged.complete,
+        )
+        return diagnosis, improved.vehicle
 
 
 def _findings(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> tuple[Finding, ...]:

@@ -46,7 +46,7 @@ def evaluated(
 
     The batches are as large and as long as that of the runs `train`, so that no other programs are needed.
     """
-    runs, size = batch(vehicle, [*train, *test]), len(train)
+    runs, size = batch(vehicle, [*train, *test]).padded(), len(train)
     found = []
     for model in models:
         finer = dataclasses.replace(runs, substeps=max(runs.substeps, model.view.runs.substeps))
@@ -61,7 +61,9 @@ def evaluated(
         white = np.stack(errors) / np.asarray(model.fit.sigma)
         rms = channel_rms(white, whole, vehicle.layout.channels)
         squares = np.sum(white**2, axis=-1)
-        found.append(Evaluation(predicted, errors, rms, list(np.where(np.isnan(squares), np.inf, squares))))
+        squares = np.where(np.isnan(squares), np.inf, squares)
+        each = [run[: len(recording.times)] for run, recording in zip(squares, test, strict=True)]
+        found.append(Evaluation(predicted, errors, rms, each))
     return found
 
 

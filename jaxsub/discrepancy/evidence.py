@@ -86,7 +86,7 @@ class Products:
     def log_evidence(self, chosen: Sequence[int]) -> float:
         """Of the recordings with the candidate columns `chosen` in the model."""
         priors = 0.5 * len(chosen) * np.log(self.samples)
-        return integrated(self._with_priors(chosen)) - float(np.sum(self.spreads)) - priors
+        return float(integrated(self._with_priors(chosen)) - np.sum(self.spreads) - priors)
 
     def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> Gains:
         """What each further candidate would add to `chosen`."""

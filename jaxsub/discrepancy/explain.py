@@ -1,6 +1,6 @@
 """What the recordings ask for, tried and asked again until what is left is random, refused or without a name."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 
 from ..effects import AbstractEffect
 from ..results import RESULTS
@@ -19,24 +19,32 @@ Answer = tuple[Model, Judged, Found | None]
 
 
 def explained(
-    trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
+    trial: Trial,
+    baseline: Model,
+    found: Found,
+    vocabulary: tuple[type[AbstractEffect], ...] | None,
+    keep: Callable[[Model, Judged], object] = lambda model, judged: None,
 ) -> Answer:
-    """The model with what can be named, as `answers` ends; the answer so far where the time is spent before."""
-    answer: Answer | None = None
+    """The model with what can be named, as `answers` ends; the answer so far where it is ended before.
+
+    Each answer before the last is given to `keep`.
+    """
+    rounds = answers(trial, baseline, found, vocabulary)
+    best, judged = baseline, Judged("unknown", [], min(1.0, 2.0 * found.naming.first_p), [])
     try:
-        for so_far in answers(trial, baseline, found, vocabulary):
-            answer = so_far
+        while True:
+            best, judged = next(rounds)
+            keep(best, incomplete(judged))
+    except StopIteration as end:
+        return end.value
     except OutOfTime:
-        best, judged, _ = answer or (baseline, Judged("unknown", [], min(1.0, 2.0 * found.naming.first_p), []), None)
-        answer = best, incomplete(judged), None
-    assert answer is not None
-    return answer
+        return best, incomplete(judged), None
 
 
 def answers(
     trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
-) -> Iterator[Answer]:
-    """The answer after each round of proposals, of which the last is the one to be given.
+) -> Generator[tuple[Model, Judged], None, Answer]:
+    """The answer so far after each round of proposals that accepts something; returns the one to be given.
 
     Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
     they leave is not random: far from the truth a linear picture shows the largest alone. Where the baseline does not
@@ -49,8 +57,7 @@ def answers(
     told_ahead = bool(baseline.fit.result != RESULTS.successful)
     ahead = by_what_comes_next(trial, baseline, vocabulary) if told_ahead else None
     if ahead is not None:
-        yield *ahead, None
-        return
+        return *ahead, None
     while True:
         said, after = judge(found.naming, found.pattern, found.memory), None
         chosen = worth_trying(found, said)
@@ -67,18 +74,17 @@ def answers(
         if chosen and not said.named:
             ahead = None if told_ahead else by_what_comes_next(trial, best, vocabulary)
             if ahead is not None:
-                yield ahead[0], both(judged, ahead[1]), None
-                return
+                return ahead[0], both(judged, ahead[1]), None
             told_ahead = True
             if said.verdict == "unknown" and refusals < MOST_REJECTIONS:
                 refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
         if after is None and not said.named:
-            yield best, judged, found
-            return
-        yield best, judged, None
+            return best, judged, found
         whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.remains)
         if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
-            return
+            return best, judged, None
+        if said.named:
+            yield best, judged
         found = after or examine(best.view, vocabulary, trial.progress)
 
 

@@ -13,16 +13,21 @@ def summary(
     physics: Sequence[Physics],
     where: Sequence[Location],
     standing: Sequence[AbstractEffect],
-    found: Explained,
+    found: Explained | None,
     p_value: float,
 ) -> str:
-    """The verdict, what is `explained` and left of the test runs' error, and effects that describe without a name."""
+    """The verdict, what is `explained` and left of the test runs' error, and effects that describe without a name.
+
+    None of an answer on the way, before the test runs are looked at.
+    """
     forces = [effect for effect in standing if isinstance(effect, SmoothForce)]
     described = [effect.label for effect in standing if effect not in forces]
     described += [f"a smooth force in {force.equation}" for force in forces]
     added = f" {', '.join(described)} describe what has no name, and claim no cause." if described else ""
     said = [_verdict(verdict, physics, where, found, p_value) + added]
-    if physics or standing:
+    if found is None:
+        said.append("The test runs were not looked at yet.")
+    elif physics or standing:
         said.append(explained_sentence(found))
     elif verdict == "unknown":
         said.append(_test_error(found))
@@ -45,7 +50,7 @@ def explained_sentence(found: Explained) -> str:
 
 
 def _verdict(
-    verdict: Verdict, physics: Sequence[Physics], where: Sequence[Location], found: Explained, p_value: float
+    verdict: Verdict, physics: Sequence[Physics], where: Sequence[Location], found: Explained | None, p_value: float
 ) -> str:
     places = " and ".join(place.where for place in where[:2]) or "no equation"
     names = ", then ".join(one.effect for one in physics)
@@ -62,8 +67,10 @@ def _verdict(
     return f"Something is missing in {places}, and nothing in the vocabulary explains it."
 
 
-def _nothing(found: Explained, p_value: float) -> str:
+def _nothing(found: Explained | None, p_value: float) -> str:
     start = "No missing effect is significant" if p_value >= SIGNIFICANCE else "No missing effect holds on the test run"
+    if found is None:
+        return f"{start}."
     if not found.left:
         return f"{start}: the model explains the recordings, and the test run to its noise."
     return f"{start}, but the simulation error on the test run is more than its noise: {sigmas(found.left)}."

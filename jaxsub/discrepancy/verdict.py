@@ -131,9 +131,9 @@ def _horizon(name: str, gain: Gain) -> str:
 
 
 def incomplete(judged: Judged) -> Judged:
-    """The verdict so far, of a diagnosis whose time is spent."""
+    """The verdict so far, of a diagnosis that is ended, or not at its end."""
     tried = "before more candidates were tried" if judged.named else "before any effect was accepted"
-    note = f"The time budget was spent {tried}: this answer is incomplete."
+    note = f"This answer is incomplete: it is the one so far, {tried}."
     return dataclasses.replace(judged, notes=[*judged.notes, note], complete=False)
 
 

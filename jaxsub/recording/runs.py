@@ -51,6 +51,26 @@ class Runs(eqx.Module):
         """Measured samples of each channel."""
         return jnp.sum(self.mask, axis=(0, 1))
 
+    def padded(self) -> "Runs":
+        """With the samples, and the distinct intervals, padded to one of the numbers that `_few` gives.
+
+        Programs that were compiled for recordings of about the same length then serve these.
+        """
+        samples, steps = (_few(self.times.shape[1]), _few(len(self.steps)))
+        more = samples - self.times.shape[1]
+        # by NumPy, for which no program has to be made
+        longer = lambda name, mode: np.pad(
+            np.asarray(array := getattr(self, name)), [(0, 0), (0, more), *[(0, 0)] * (array.ndim - 2)], mode=mode
+        )
+        later = np.asarray(self.times)[:, -1:] + float(self.steps[0]) * np.arange(1, more + 1)
+        arrays = {
+            "times": np.concatenate([np.asarray(self.times), later], axis=1),
+            "steps": np.pad(np.asarray(self.steps), (0, steps - len(self.steps)), mode="edge"),
+            **{name: longer(name, "edge") for name in ("step_of", "signals")},
+            **{name: longer(name, "constant") for name in ("live", "outputs", "mask")},
+        }
+        return dataclasses.replace(self, **jax.device_put(arrays))
+
     def take(self, chosen: Sequence[int], size: int) -> "Runs":
         """The runs numbered `chosen`, filled up to `size` with copies that count for nothing.
 
@@ -97,6 +117,12 @@ class Runs(eqx.Module):
             outputs=cut(self.outputs, inside),
             mask=cut(self.mask, inside) & every(owned & (index < samples))[..., None],
         )
+
+
+def _few(count: int) -> int:
+    """The least number from `count` on that has four binary digits before its zeros: one eighth more at most."""
+    unit = 2 ** max(0, count.bit_length() - 4)
+    return -(-count // unit) * unit
 
 
 def stack_runs(
