@@ -30,14 +30,15 @@ def explained(
     Each answer before the last is given to `keep`.
     """
     rounds = answers(trial, baseline, found, vocabulary)
-    best, judged = baseline, Judged("unknown", [], min(1.0, 2.0 * found.naming.first_p), [])
+    last: tuple[Model, Judged] | None = None
     try:
         while True:
-            best, judged = next(rounds)
+            last = best, judged = next(rounds)
             keep(best, incomplete(judged))
     except StopIteration as end:
         return end.value
     except OutOfTime:
+        best, judged = last or (baseline, Judged("unknown", [], min(1.0, 2.0 * found.naming.first_p), []))
         return best, incomplete(judged), None
 
 

@@ -181,7 +181,9 @@ def augmented(
     """F and B of z ← F z + B w for z = [x, d], where x follows A and the force's start and end G (`System`)."""
     s, n = A.shape[-1], len(disturbance.force)
     rho = jnp.exp(-interval[..., None] / disturbance.time)
-    fresh = disturbance.force * jnp.sqrt(1.0 - rho**2)
+    # no time passes where a shorter run is padded, and there the root has no derivative
+    lasts = interval[..., None] > 0.0
+    fresh = disturbance.force * jnp.where(lasts, jnp.sqrt(1.0 - jnp.where(lasts, rho, 0.0) ** 2), 0.0)
     begin, end = G[..., :n], G[..., n:]
     empty = jnp.zeros((*interval.shape, s + n, s + n))
     diagonal = jnp.eye(n) * rho[..., None]

@@ -43,6 +43,18 @@ def test_a_turn_leads_to_nothing_less_probable(fitted, monkeypatch):
     assert float(half.disturbance.force[0] / found.disturbance.force[0]) == pytest.approx(1.0, rel=1e-6)
 
 
+def test_runs_of_unequal_length_have_a_disturbance(fitted):
+    """Claim: samples that are padded change nothing: the disturbance, numbers and likelihood are those without them."""
+    padded = fitted.runs.padded()
+    assert padded.times.shape[1] > fitted.runs.times.shape[1]
+    found, same = (look(one) for one in (fitted, fit(wrong(), padded)))
+    assert evidence_of(same) == pytest.approx(evidence_of(found), rel=1e-6)
+    assert np.asarray(same.disturbance.force) == pytest.approx(np.asarray(found.disturbance.force), rel=1e-3)
+    # it moved from where it began
+    begun = view._guessed(fitted.model.whole, fitted.runs, fitted.sigma, fitted.problem.spread)
+    assert np.max(np.abs(np.log(found.disturbance.force / np.asarray(begun.force)))) > 0.1
+
+
 def test_searches_that_agree_are_one():
     """Claim: of searches that came to the same cost one goes on; the order is by cost, those without one last."""
 
