@@ -36,7 +36,6 @@ from .validation import beyond_noise
 from .verdict import Judged
 from .view import View, look
 
-
 # told each answer before the last: the diagnosis, which is not `complete`, and the improved vehicle
 Keep = Callable[[Diagnosis, AbstractVehicle], object]
 
