@@ -19,7 +19,16 @@ HERE = Path(__file__).parent
 NOTEBOOKS = HERE.parent
 _EXTRAS = ["fenced-code-blocks", "tables", "header-ids", "code-friendly", "cuddled-lists"]
 # in the order in which they are read
-GUIDES = ("index", "which-method", "add-a-vehicle", "add-an-effect", "add-an-estimator", "logs-and-data", "posterior")
+GUIDES = (
+    "index",
+    "how-diagnosis-works",
+    "which-method",
+    "add-a-vehicle",
+    "add-an-effect",
+    "add-an-estimator",
+    "logs-and-data",
+    "posterior",
+)
 
 
 class Page(NamedTuple):

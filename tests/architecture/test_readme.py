@@ -1,6 +1,9 @@
-"""Every table of measured numbers in the README names a command that makes it, and every command there exists."""
+"""Every table of measured numbers in the README names a command that makes it; commands and calls there exist."""
 
+import ast
+import importlib
 import importlib.util
+import inspect
 import re
 import shlex
 from pathlib import Path
@@ -81,3 +84,25 @@ def test_every_command_of_jaxsub_is_understood(line):
 @pytest.mark.parametrize("picture", re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README))
 def test_every_picture_is_there(picture):
     assert (ROOT / picture).is_file()
+
+
+def calls():
+    """Calls by a name that a block of Python imports from jaxsub, with what the name is."""
+    for block in re.findall(r"^```python\n(.*?)^```", README, re.MULTILINE | re.DOTALL):
+        tree = ast.parse(block)
+        imported = {
+            alias.name: getattr(importlib.import_module(node.module), alias.name)
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("jaxsub")
+            for alias in node.names
+        }
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in imported:
+                yield pytest.param(imported[node.func.id], node, id=ast.unparse(node))
+
+
+@pytest.mark.parametrize(("called", "call"), list(calls()))
+def test_every_call_of_python_is_understood(called, call):
+    """Claim: what is called takes the arguments that it is given."""
+    names = {keyword.arg: None for keyword in call.keywords if keyword.arg}
+    inspect.signature(called).bind_partial(*call.args, **names)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from jaxsub.cli.app import app
+from jaxsub.discrepancy import settings
 from jaxsub.recording import read_selection
 
 GUIDES = sorted((Path(__file__).parents[2] / "notebooks" / "guide").glob("*.md"))
@@ -60,3 +61,12 @@ def test_map_of_a_guide_is_understood(tmp_path):
     assert chosen.every == 0.02
     assert chosen.term("delta_r[deg]") == (25.0, "", "actuator_servos.control[1]", 0.0)
     assert chosen.term("psi") == (1.0, "yaw", "vehicle_attitude.q", 0.0)
+
+
+def test_constants_of_the_guide_are_settings():
+    """Claim: the page on how a diagnosis works is short, and every constant that it names is one of the settings."""
+    (guide,) = [path for path in GUIDES if path.stem == "how-diagnosis-works"]
+    text = guide.read_text(encoding="utf-8")
+    named = set(re.findall(r"`([A-Z][A-Z_]+)`", text))
+    assert len(named) > 10 and named <= vars(settings).keys()
+    assert len(text.splitlines()) <= 120
