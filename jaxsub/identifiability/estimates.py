@@ -5,10 +5,14 @@ import math
 
 from ..estimate import Fit
 from .coloured import Coloured
+from .directions import FRACTION
 from .rank import Identifiability
 
 # what stands for a verdict where none was reached
 UNKNOWN = "not asked"
+# and for one that holds for white residuals alone
+WHITE_ALONE = "identified only if residuals were white"
+_LONGER = "forces that the model lacks hide it: record longer runs, or try jaxsub diagnose"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,7 +24,8 @@ class Estimate:
     - `name`, `value`, `unit`: SI.
     - `standard_error`: allows for coloured and oversized residuals. `standard_error_white`: takes them for white noise
       of the given σ. None where there is none: at a bound, or where nothing bounds the coefficient.
-    - `verdict`: `identified`, or why not. `remedy`: what would identify it.
+    - `verdict`: `identified`, for which `standard_error` is below half its size too, or why not. `remedy`: what would
+      identify it.
     """
 
     name: str
@@ -53,5 +58,7 @@ def estimates(fit: Fit, said: Identifiability | None, coloured: Coloured | None)
         allowed = allowed if math.isfinite(allowed) else size * white[name]
         errors = (None, None) if none else (allowed, white[name])
         kind, remedy = (verdict.kind, verdict.remedy) if verdict else (UNKNOWN, "")
+        if verdict and kind == "identified" and verdict.relative_error * allowed > FRACTION * white[name]:
+            kind, remedy = WHITE_ALONE, _LONGER
         found.append(Estimate(name, value, unit[name], *errors, kind, remedy))
     return found

@@ -1,5 +1,7 @@
 """What a fit that does not fit says of its coefficients: a hole, a dead sensor and spikes leave none identified."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -86,6 +88,20 @@ def test_errors_allow_for_residuals_that_are_too_large():
     found = fit(steering(0.002), stacked(steering(0.002), [log()]))
     for estimate in estimates(found, identifiability(found), coloured_covariance(found)):
         assert 3.0 < estimate.standard_error / estimate.standard_error_white < 10.0
+
+
+def test_what_slow_forces_hide_is_not_identified():
+    """Claim: a standard error above half the size is never called identified, also where white residuals told more."""
+    found = fit(steering(), stacked(steering(), [log()]))
+    said, coloured = identifiability(found), coloured_covariance(found)
+    assert {one.verdict for one in estimates(found, said, coloured)} == {"identified"}
+    # of one coefficient, in the middle of its interval for white residuals and beyond
+    at = found.names.index("D_yaw")
+    for share, verdict in ((0.45, "identified"), (0.55, "identified only if residuals were white")):
+        wide = coloured.covariance.at[at, at].set((share * found.values["D_yaw"]) ** 2)
+        by_name = {e.name: e for e in estimates(found, said, dataclasses.replace(coloured, covariance=wide))}
+        assert by_name["D_yaw"].verdict == verdict
+        assert {e.verdict for name, e in by_name.items() if name != "D_yaw"} == {"identified"}
 
 
 def test_a_coefficient_at_its_bound_has_no_error_and_others_hold_with_it_there():
