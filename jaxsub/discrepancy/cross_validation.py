@@ -143,8 +143,12 @@ def _prior_pull(problem: Problem) -> Float[np.ndarray, " p"]:
 
 def _left(others: Float[np.ndarray, "q q"], block: Float[np.ndarray, "q q"]) -> float:
     """The squares that a block has at the numbers of the `others`."""
-    size = np.sqrt(np.maximum(np.diag(others)[1:], 1e-300))
-    unit = others[1:, 1:] / np.outer(size, size)
+    with np.errstate(invalid="ignore", over="ignore"):
+        size = np.sqrt(np.maximum(np.diag(others)[1:], 1e-300))
+        unit = others[1:, 1:] / size[:, None] / size
+    # sums of products that are floats, as of a model that nearly diverges, need be none
+    if not (np.all(np.isfinite(unit)) and np.all(np.isfinite(others[1:, 0]))):
+        return np.inf
     step = np.linalg.lstsq(unit, others[1:, 0] / size, rcond=1e-12)[0] / size
     at = np.concatenate([[1.0], -step])
     return float(at @ block @ at)

@@ -126,3 +126,13 @@ def test_a_vehicle_that_runs_away_is_predicted_nowhere():
     model = BlockLinearised.of(away, whole.runs, whole.start, whole.sigma, whole.problem.spread)
     assert not bool(jnp.all(jnp.isfinite(model.error)))
     assert np.all(np.isneginf(simulated(dataclasses.replace(whole, vehicle=away, model=model))))
+
+
+@pytest.mark.parametrize("power", [100, 140, 150, 153, 155])
+def test_a_vehicle_that_nearly_runs_away_raises_nothing(power):
+    """Claim: sensitivities up to the largest float leave each block a density or none; no error, and no NaN."""
+    whole = fitted()
+    far = dataclasses.replace(whole.model.whole, theta=whole.model.whole.theta * 10.0**power)
+    model = dataclasses.replace(whole.model, only=far)
+    found = simulated(dataclasses.replace(whole, model=model))
+    assert not np.any(np.isnan(found)) and np.all(found <= 0.0)
