@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import special
 
+from ..arrays import quietly
 from ..estimate import Fit, Problem
 from .evidence import conditional
 from .settings import BLOCKS, BLOCKS_ONE_STEP, LEVEL
@@ -108,6 +109,7 @@ def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     return conditional(gram, products, logarithms)
 
 
+@quietly
 def simulated(fit: Fit, blocks: int = BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
     """`Predicted.simulation` of a fit, in so many `blocks` a run; the initial states may be `known_start`."""
     products = _simulation_products(fit, blocks)
@@ -143,9 +145,8 @@ def _prior_pull(problem: Problem) -> Float[np.ndarray, " p"]:
 
 def _left(others: Float[np.ndarray, "q q"], block: Float[np.ndarray, "q q"]) -> float:
     """The squares that a block has at the numbers of the `others`."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        size = np.sqrt(np.maximum(np.diag(others)[1:], 1e-300))
-        unit = others[1:, 1:] / size[:, None] / size
+    size = np.sqrt(np.maximum(np.diag(others)[1:], 1e-300))
+    unit = others[1:, 1:] / size[:, None] / size
     # sums of products that are floats, as of a model that nearly diverges, need be none
     if not (np.all(np.isfinite(unit)) and np.all(np.isfinite(others[1:, 0]))):
         return np.inf
