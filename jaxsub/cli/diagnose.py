@@ -62,7 +62,7 @@ def run(
             answer.write(folder)
     terminal.note(f"report: {out / 'report.html'}")
     if not answer.diagnosis.complete and (watch := options().watch) is not None and watch.interrupted:
-        options().kept = f"{out} holds the answer so far, which is incomplete"
+        options().kept = _held(answer, out)
         raise KeyboardInterrupt
 
 
@@ -71,7 +71,11 @@ def _keep(answer: "Answer", fresh: Fresh, out: Path) -> None:
     with suppress(OutputError):
         with fresh() as folder:
             answer.write_numbers(folder)
-        options().kept = f"{out} holds the answer{'' if answer.diagnosis.complete else ' so far, which is incomplete'}"
+        options().kept = _held(answer, out)
+
+
+def _held(answer: "Answer", out: Path) -> str:
+    return f"{out} holds the answer{'' if answer.diagnosis.complete else ' so far, which is incomplete'}"
 
 
 @dataclasses.dataclass(frozen=True)

@@ -161,10 +161,8 @@ def _simulation_products(fit: Fit, blocks: int) -> Float[np.ndarray, "r b q q"]:
     weight = (np.asarray(runs.mask) / np.asarray(fit.sigma))[..., None]
     parts = (model.error[..., None], model.theta, model.start)
     samples = 1 + np.asarray(runs.live).sum(axis=1)
-    # a model that diverges has no numbers, which is for the caller to see
-    with np.errstate(invalid="ignore", over="ignore"):
-        columns = np.concatenate([np.asarray(part) for part in parts], axis=-1) * weight
-        return np.stack([_by_block(run[:count], blocks) for run, count in zip(columns, samples, strict=True)])
+    columns = np.concatenate([np.asarray(part) for part in parts], axis=-1) * weight
+    return np.stack([_by_block(run[:count], blocks) for run, count in zip(columns, samples, strict=True)])
 
 
 def _by_block(columns: Float[np.ndarray, "k c q"], blocks: int) -> Float[np.ndarray, "b q q"]:

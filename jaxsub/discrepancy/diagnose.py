@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -74,35 +75,41 @@ def diagnose(
     found = examine(view, vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
-    account = _Account(vehicle, train, found, field)
     trial, baseline = Trial(until, vehicle), fitted_model(start, found.view, ())
-    so_far = lambda model, judged: keep(*account.of(baseline, model, model, judged, ()))
+    account = _Account(vehicle, train, found, field, baseline)
+    so_far = lambda model, judged: keep(*account.of(model, model, judged, ()))
     named, judged, left = explained(trial, baseline, found, vocabulary, so_far)
     best, judged = (named, judged) if left is None else described(trial, named, left, judged, vocabulary)
     if best.pieces > 1:
-        baseline = in_pieces(baseline, best.pieces)
+        account = dataclasses.replace(account, baseline=in_pieces(baseline, best.pieces))
     progress("simulating the test runs")
-    return account.of(baseline, named, best, judged, test)
+    return account.of(named, best, judged, test)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Account:
-    """How an answer is put together: the vehicle, its training runs, and the first look at them."""
+    """How an answer is put together: the vehicle, its training runs, the first look at them, and the baseline."""
 
     vehicle: AbstractVehicle
     train: Sequence[Recording]
     first: Found
     field: Field
+    baseline: Model
+
+    @cached_property
+    def start(self) -> Fit:
+        """The baseline's fit, with errors that allow for its disturbance: the same in every answer."""
+        return allowing_for(self.baseline.view, self.baseline.fit)
 
     def of(
-        self, baseline: Model, named: Model, best: Model, judged: Judged, test: Sequence[Recording]
+        self, named: Model, best: Model, judged: Judged, test: Sequence[Recording]
     ) -> tuple[Diagnosis, AbstractVehicle]:
         """The diagnosis, and the improved vehicle: the `best` model, of which the `named` one has the numbers of names.
 
         Without a `test` run nothing is shown of any.
         """
         vehicle, train, field, layout = self.vehicle, self.train, self.field, self.vehicle.layout
-        start = allowing_for(baseline.view, baseline.fit)
+        start, baseline = self.start, self.baseline
         improved = allowing_for(best.view, best.fit) if best.added else start
         sigma = np.asarray(start.sigma)
         standing = best.added[len(named.added) :]

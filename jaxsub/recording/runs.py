@@ -56,19 +56,16 @@ class Runs(eqx.Module):
 
         Programs that were compiled for recordings of about the same length then serve these.
         """
-        samples, steps = (_few(self.times.shape[1]), _few(len(self.steps)))
-        more = samples - self.times.shape[1]
+        more = _few(self.times.shape[1]) - self.times.shape[1]
         # by NumPy, for which no program has to be made
-        longer = lambda name, mode: np.pad(
-            np.asarray(array := getattr(self, name)), [(0, 0), (0, more), *[(0, 0)] * (array.ndim - 2)], mode=mode
-        )
-        later = np.asarray(self.times)[:, -1:] + float(self.steps[0]) * np.arange(1, more + 1)
-        arrays = {
-            "times": np.concatenate([np.asarray(self.times), later], axis=1),
-            "steps": np.pad(np.asarray(self.steps), (0, steps - len(self.steps)), mode="edge"),
-            **{name: longer(name, "edge") for name in ("step_of", "signals")},
-            **{name: longer(name, "constant") for name in ("live", "outputs", "mask")},
-        }
+        own = {name: np.asarray(getattr(self, name)) for name in ("step_of", "signals", "live", "outputs", "mask")}
+        mode = lambda name: "edge" if name in ("step_of", "signals") else "constant"
+        longer = lambda name, array: np.pad(array, [(0, 0), (0, more), *[(0, 0)] * (array.ndim - 2)], mode=mode(name))
+        times, steps = np.asarray(self.times), np.asarray(self.steps)
+        later = times[:, -1:] + steps[0] * np.arange(1, more + 1)
+        arrays = {name: longer(name, array) for name, array in own.items()}
+        arrays["times"] = np.concatenate([times, later], axis=1)
+        arrays["steps"] = np.pad(steps, (0, _few(len(steps)) - len(steps)), mode="edge")
         return dataclasses.replace(self, **jax.device_put(arrays))
 
     def take(self, chosen: Sequence[int], size: int) -> "Runs":

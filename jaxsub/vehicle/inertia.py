@@ -72,7 +72,8 @@ def indefinite(matrix: np.ndarray, equations: tuple[str, ...], names: list[str])
 
     They are those in the rows that dominate the eigenvector of the most negative eigenvalue.
     """
-    values, vectors = np.linalg.eigh(0.5 * matrix + 0.5 * matrix.T)  # a sum of what is near the largest float overflows
+    # a sum of what is near the largest float would overflow
+    values, vectors = np.linalg.eigh(0.5 * matrix + 0.5 * matrix.T)
     if values[0] > 0.0:
         return []
     weight = np.abs(vectors[:, 0])

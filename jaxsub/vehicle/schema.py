@@ -10,7 +10,7 @@ from ..parameters import Parameter
 from ..units import UnknownUnit, is_si, same_dimension, si_unit
 from .base import Output
 
-# and its inverse the smallest: what a model makes of several such numbers is a float still
+# the largest size of a number, and its inverse the smallest: what a model makes of several such is a float still
 _LARGEST = 1e60
 _NUMBER_KEYS = ("value", "fixed", "free", "bounds", "prior_std", "prior_mean", "unit")
 _ACCELEROMETER = ("ax", "ay", "az")
