@@ -77,7 +77,7 @@ class Watch:
             self._heed = False
 
     def last_word(self, say: Callable[[], object]) -> None:
-        """`say()`, unless the process has said its last word, as the watching thread may while this one ends."""
+        """`say()`, once; where the watching thread is ending the process this one waits for it to do so."""
         with self._word:
             if not self._spoken:
                 self._spoken = True
@@ -108,9 +108,12 @@ class Watch:
                         break
                     interrupted = True
                     signals.settimeout(None if self._heed else GRACE)
-        abandon()
-        self.last_word(self._say)
-        leave(INTERRUPTED)
+        # to the end of the process: the main thread, if it ends by itself meanwhile, may not exit in the midst of it
+        with self._word:
+            abandon()
+            if not self._spoken:
+                self._say()
+            leave(INTERRUPTED)
 
     def _say(self) -> None:
         with contextlib.suppress(OSError):
