@@ -1,4 +1,4 @@
-"""Every table of measured numbers in the README names a command that makes it; commands and calls there exist."""
+"""README and the pages of experiments: a table of measured numbers names its command; commands, calls and links exist."""
 
 import ast
 import importlib
@@ -13,14 +13,17 @@ import pytest
 from jaxsub.cli.app import app
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", *sorted((ROOT / "experiments").glob("*/README.md"))]
+TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in PAGES}
+README = TEXTS["README.md"]
 EXPERIMENT = re.compile(r"python -m (experiments\.\w+)([^`\n]*)")
 
 
 def sections():
-    """Chapters by title, with their text."""
+    """README's chapters by title and the pages of experiments by path, with their text."""
     parts = re.split(r"^## (.*)$", README, flags=re.MULTILINE)
-    return dict(zip(parts[1::2], parts[2::2], strict=True))
+    chapters = dict(zip(parts[1::2], parts[2::2], strict=True))
+    return chapters | {name: text for name, text in TEXTS.items() if name != "README.md"}
 
 
 def tables(text):
@@ -34,7 +37,7 @@ def measured(table):
 
 
 def experiments():
-    return sorted({(match[1], match[2].strip()) for match in EXPERIMENT.finditer(README)})
+    return sorted({(match[1], match[2].strip()) for text in TEXTS.values() for match in EXPERIMENT.finditer(text)})
 
 
 def test_readme_has_tables_and_commands_to_look_at():
