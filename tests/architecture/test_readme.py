@@ -1,4 +1,4 @@
-"""README and the pages of experiments: a table of measured numbers names its command; commands, calls and links exist."""
+"""README and pages of experiments: a table of measured numbers names its command; commands and calls exist."""
 
 import ast
 import importlib
