@@ -1,1 +1,1 @@
-"""Experiments: commands that produce the numbers and figures the README quotes."""
+"""Experiments: commands that produce the numbers and figures of README and of the pages here."""
