@@ -1,4 +1,4 @@
-"""Guides, lessons and gallery as pages of one look."""
+"""Guides, pages of experiments, lessons and gallery as pages of one look."""
 
 import json
 import re
@@ -15,20 +15,25 @@ from jaxsub.effects import VOCABULARY
 from . import mathematics
 from .reference import Reference
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parent
 NOTEBOOKS = HERE.parent
+ROOT = NOTEBOOKS.parent
 _EXTRAS = ["fenced-code-blocks", "tables", "header-ids", "code-friendly", "cuddled-lists"]
 # in the order in which they are read
 GUIDES = (
     "index",
+    "add-a-vehicle",
+    "logs-and-data",
+    "commands",
     "how-diagnosis-works",
     "which-method",
-    "add-a-vehicle",
+    "controllers",
+    "sweeps",
+    "posterior",
     "add-an-effect",
     "add-an-estimator",
-    "logs-and-data",
-    "posterior",
 )
+_LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)#\s]+)")
 
 
 class Page(NamedTuple):
@@ -42,21 +47,29 @@ class Page(NamedTuple):
 def write_pages(out: Path, reference: Reference) -> list[str]:
     """Write everything but the reference; what is wrong with it."""
     found = []
-    pages = [_guide(name, reference) for name in GUIDES]
-    for name in GUIDES:
-        text = guide_text(name)
-        found += [f"guide/{name}.md: {fault}" for _, fault in reference.names(text) if fault]
+    guides = [NOTEBOOKS / "guide" / f"{name}.md" for name in GUIDES]
+    measurements = [ROOT / "experiments" / "README.md", *sorted((ROOT / "experiments").glob("*/README.md"))]
+    sources = [*guides, ROOT / "CONTRIBUTING.md", *measurements]
+    for path in sources:
+        faults = (fault for _, fault in reference.names(source_text(path)) if fault)
+        found += [f"{path.relative_to(ROOT)}: {fault}" for fault in faults]
     found += [f"guide/{p.name}: is in no list" for p in (NOTEBOOKS / "guide").glob("*.md") if p.stem not in GUIDES]
     gallery, missing = _gallery(reference)
     lessons = [_lesson(path) for path in sorted(NOTEBOOKS.glob("*.ipynb"))]
     shutil.copytree(NOTEBOOKS / "gallery", out / "gallery", ignore=shutil.ignore_patterns("*.json"))
     for picture in NOTEBOOKS.glob("*.png"):
         shutil.copy(picture, out / picture.name)
-    everything = [*pages, gallery, *lessons]
+    pages = {path: _page(path, reference) for path in sources}
+    everything = [*pages.values(), gallery, *lessons]
     template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(
         (HERE / "templates" / "page.html.j2").read_text(encoding="utf-8")
     )
-    menu = {"Guide": pages, "Effects": [gallery], "Lessons": lessons}
+    menu = {
+        "Guide": [page for path, page in pages.items() if path not in measurements],
+        "Effects": [gallery],
+        "Lessons": lessons,
+        "Experiments": [pages[path] for path in measurements],
+    }
     style = (HERE / "templates" / "site.css").read_text(encoding="utf-8")
     for page in everything:
         made = template.render(page=page, menu=menu, style=style, rooms=_rooms(reference))
@@ -64,16 +77,31 @@ def write_pages(out: Path, reference: Reference) -> list[str]:
     return found + missing
 
 
-def guide_text(name: str) -> str:
-    """A guide with the README's tables where it asks for them: `{readme-table: how its header begins}`."""
-    readme = (NOTEBOOKS.parent / "README.md").read_text(encoding="utf-8")
-    tables = re.findall(r"^\|.*(?:\n\|.*)+", readme, re.MULTILINE)
+def source_text(path: Path) -> str:
+    """A Markdown file with tables of experiments where it asks for them: `{table of NAME: how its header begins}`."""
 
     def table(match: re.Match[str]) -> str:
-        return next(table for table in tables if table.startswith(f"| {match[1].strip()}"))
+        page = (ROOT / "experiments" / match[1] / "README.md").read_text(encoding="utf-8")
+        tables = re.findall(r"^\|.*(?:\n\|.*)+", page, re.MULTILINE)
+        return next(table for table in tables if table.startswith(f"| {match[2].strip()}"))
 
-    text = (NOTEBOOKS / "guide" / f"{name}.md").read_text(encoding="utf-8")
-    return re.sub(r"^\{readme-table: (.*)\}$", table, text, flags=re.MULTILINE)
+    text = path.read_text(encoding="utf-8")
+    return re.sub(r"^\{table of (\w+): (.*)\}$", table, text, flags=re.MULTILINE)
+
+
+def address(path: Path) -> str:
+    """Where a file of the repository is in the site: all pages and pictures lie in its root."""
+    if path.parent == NOTEBOOKS / "gallery" and path.suffix != ".md":
+        return f"gallery/{path.name}"
+    if path.suffix != ".md":
+        return path.name
+    name = path.stem if path.name != "README.md" else "-".join(path.parent.relative_to(ROOT).parts)
+    return f"{name.lower()}.html"
+
+
+def site_links(text: str, path: Path) -> str:
+    """Markdown of the file `path` with its links to other files of the repository as links within the site."""
+    return _LINK.sub(lambda match: address((path.parent / match[1]).resolve()), text)
 
 
 def markdown_page(text: str, reference: Reference) -> str:
@@ -82,9 +110,9 @@ def markdown_page(text: str, reference: Reference) -> str:
     return mathematics.put_math(str(markdown2.markdown(kept, extras=_EXTRAS)), made)
 
 
-def _guide(name: str, reference: Reference) -> Page:
-    text = guide_text(name)
-    return Page(f"{name}.html", text.partition("\n")[0].lstrip("# "), markdown_page(text, reference))
+def _page(path: Path, reference: Reference) -> Page:
+    text = source_text(path)
+    return Page(address(path), text.partition("\n")[0].lstrip("# "), markdown_page(site_links(text, path), reference))
 
 
 def _lesson(path: Path) -> Page:

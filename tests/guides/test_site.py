@@ -51,6 +51,17 @@ def test_missing_docstrings_are_faults():
     assert found == ["jaxsub.bare: has no docstring", "jaxsub.bare.silent: has no docstring"]
 
 
-def test_tables_of_the_readme_stand_in_the_guide():
-    assert "| Gauss–Newton (Levenberg–Marquardt) |" in pages.guide_text("which-method")
-    assert all("{readme-table" not in pages.guide_text(name) for name in pages.GUIDES)
+def test_tables_of_experiments_stand_in_the_guide():
+    guides = {name: pages.source_text(pages.NOTEBOOKS / "guide" / f"{name}.md") for name in pages.GUIDES}
+    assert "| Gauss–Newton (Levenberg–Marquardt) |" in guides["which-method"]
+    assert all("{table" not in text for text in guides.values())
+
+
+def test_links_between_files_are_links_between_pages():
+    guide = pages.NOTEBOOKS / "guide" / "index.md"
+    text = (
+        "[a](sweeps.md#clusters) [b](../../experiments/emps/README.md) ![c](../report.png) [d](https://example.org/x)"
+    )
+    assert pages.site_links(text, guide) == (
+        "[a](sweeps.html#clusters) [b](experiments-emps.html) ![c](report.png) [d](https://example.org/x)"
+    )
