@@ -1,4 +1,4 @@
-"""README and pages of experiments: a table of measured numbers names its command; commands and calls exist."""
+"""README and pages of experiments: measured numbers name their command; commands, calls and links exist; short text."""
 
 import ast
 import importlib
@@ -10,13 +10,21 @@ from pathlib import Path
 
 import pytest
 
+from experiments import tables as tables_of
 from jaxsub.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "experiments").glob("*/README.md"))]
+LINKED = [
+    *PAGES,
+    ROOT / "experiments" / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "notebooks" / "guide").glob("*.md")),
+]
 TEXTS = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in PAGES}
 README = TEXTS["README.md"]
-EXPERIMENT = re.compile(r"python -m (experiments\.\w+)([^`\n]*)")
+EXPERIMENT = re.compile(r"python -m (experiments\.[a-z_]+)([^`\n]*)")
+MADE_ON = re.compile(r"\]\((experiments/\w+/README\.md)\)")
 
 
 def sections():
@@ -47,14 +55,13 @@ def test_readme_has_tables_and_commands_to_look_at():
 
 @pytest.mark.parametrize("title", [t for t, text in sections().items() if any(map(measured, tables(text)))])
 def test_every_table_of_numbers_names_its_command(title):
+    """Claim: a command stands before the table or in each row, or each row links to the page where one does."""
     text = sections()[title]
     for table in filter(measured, tables(text)):
-        head, rows = table.splitlines()[0], table.splitlines()[2:]
-        if "command" in head:
-            for row in rows:
-                assert EXPERIMENT.search(row.rstrip("| ").rsplit("|", 1)[1]), f"no command in: {row[:80]}"
-        else:
-            assert EXPERIMENT.search(text[: text.index(table)]), f"no command before the table {head[:80]}"
+        if not EXPERIMENT.search(text[: text.index(table)]):
+            for row in table.splitlines()[2:]:
+                page = MADE_ON.search(row)
+                assert EXPERIMENT.search(TEXTS[page[1]] if page else row), f"no command in: {row[:80]}"
 
 
 @pytest.mark.parametrize(("module", "options"), experiments())
@@ -84,9 +91,37 @@ def test_every_command_of_jaxsub_is_understood(line):
     assert app.commands[words[0]].make_context(words[0], words[1:]).params
 
 
-@pytest.mark.parametrize("picture", re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README))
-def test_every_picture_is_there(picture):
-    assert (ROOT / picture).is_file()
+@pytest.mark.parametrize("page", LINKED, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_leads_to_a_file(page):
+    text = re.sub(r"```.*?```|`[^`\n]*`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for address in re.findall(r"\]\(([^)\s]+)\)", text):
+        path = address.partition("#")[0]
+        assert re.match(r"https?:", address) or not path or (page.parent / path).is_file(), address
+
+
+def sentences(text):
+    """Sentences of a document's paragraphs and lists, without code, tables and headings."""
+    prose = re.sub(r"^```[\s\S]*?^```|^\|.*$|^#.*$|^!\[.*$", "", text, flags=re.MULTILINE)
+    for paragraph in re.split(r"\n\s*\n|^\s*(?:-|\d+\.) ", prose, flags=re.MULTILINE):
+        yield from re.split(r"(?<=[.!?])\s+", " ".join(paragraph.split()))
+
+
+def test_readme_is_short():
+    """Claim: README has at most 200 lines, no sentence over 30 words and no table over 8 rows."""
+    assert len(README.splitlines()) <= 200
+    assert [sentence for sentence in sentences(README) if len(sentence.split()) > 30] == []
+    assert max(len(table.splitlines()) - 2 for table in tables(README)) <= 8
+
+
+def test_length_of_sentences_is_seen():
+    text = "# A b\n\nOne two.\nThree four five.\n\n- six\n- seven eight\n\n| a b c d |\n\n```\nx y z w v\n```\n"
+    assert max(len(sentence.split()) for sentence in sentences(text)) == 3
+
+
+@pytest.mark.parametrize("page", tables_of.pages(), ids=lambda page: page.parent.name)
+def test_tables_are_made_of_committed_results(page):
+    assert "<!-- table: " in page.read_text(encoding="utf-8")
+    assert page.read_text(encoding="utf-8") == tables_of.generated(page), "run python -m experiments.tables"
 
 
 def calls():
