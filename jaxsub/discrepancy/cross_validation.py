@@ -101,7 +101,7 @@ def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     """`Predicted.one_step` of a view's vehicle under the view's disturbance."""
     products, logarithms = view.products(view.base, view.disturbance, BLOCKS_ONE_STEP)
     # what lies beyond the end of a short run has nothing
-    there = (logarithms != 0.0) | np.any(products != 0.0, axis=(1, 2))
+    there = view.measured_by_part(BLOCKS_ONE_STEP) > 0
     products, logarithms = products[there], logarithms[there]
     gram = products.sum(axis=0) + np.asarray(view.prior)
     if not np.all(np.isfinite(gram)):

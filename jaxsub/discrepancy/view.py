@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ..arrays import quietly
 from ..effects import Facts, Motion, wave_band
@@ -18,6 +18,7 @@ from ..likelihood import (
     Linearised,
     System,
     first_guess,
+    part_length,
     part_products,
     smoothed,
 )
@@ -112,6 +113,15 @@ class View:
         pieces = pieces or max(1, -(-BLOCKS // len(system.measured)))
         found, spreads = part_products(disturbance, system, columns, pieces)
         return found.reshape(-1, *found.shape[2:]), spreads.reshape(-1)
+
+    def measured_by_part(self, pieces: int) -> Int[np.ndarray, " m"]:
+        """How many values were measured in each part that `products` makes of the recordings."""
+        counts = np.asarray(self.followed.system.measured).sum(axis=-1)
+        begins = part_length(counts.shape[1], pieces) * np.arange(1, pieces)
+        begins = begins[begins < counts.shape[1]]
+        found = [part.sum(axis=1) for part in np.split(counts, begins, axis=1)]
+        empty = [np.zeros(len(counts), int)] * (pieces - len(found))
+        return np.stack([*found, *empty], axis=1).reshape(-1)
 
     def measured(self, channel: str) -> np.ndarray:
         """All samples that `channel` has in the recordings, SI."""

@@ -18,6 +18,7 @@ from .disturbance import (
     smoothed,
     whitened,
 )
+from .innovation_products import part_length
 from .innovations import Followed, follow
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
 from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise, propagate
@@ -48,6 +49,7 @@ __all__ = [
     "nobody",
     "output_errors",
     "padded_width",
+    "part_length",
     "part_products",
     "products",
     "propagate",

@@ -93,6 +93,18 @@ def passes(steps: Steps, begin: Float[Array, "z z"], of: Callable[[Passed], T]) 
     return jax.vmap(lambda at: jax.lax.scan(step, (begin, nothing), at)[1])(whole)
 
 
+def part_length(samples: int, parts: int) -> int:
+    """How many samples of a run of so many `samples` each of its `parts` has; the last may have fewer, or none."""
+    pieces, length = _cut(samples, parts)
+    return pieces * length
+
+
+def _cut(samples: int, parts: int) -> tuple[int, int]:
+    """How many pieces each part of a run is filtered in, and how many samples each of these has."""
+    pieces = max(1, round(samples / parts / _AT_ONCE))
+    return pieces, -(-samples // (parts * pieces))
+
+
 def products_by_part(
     steps: Steps, begin: Float[Array, "z z"], parts: int
 ) -> tuple[Float[Array, "r m q q"], Float[Array, "r m"]]:
@@ -102,8 +114,7 @@ def products_by_part(
     they lie, for copies of very many columns would take longer than to filter them.
     """
     runs, samples, q = steps.noise.shape[0], steps.noise.shape[1], steps.shown.shape[-1]
-    pieces = max(1, round(samples / parts / _AT_ONCE))
-    length = -(-samples // (parts * pieces))
+    pieces, length = _cut(samples, parts)
 
     def met(run: Array, carry: tuple[Array, Array], k: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         at = jax.tree.map(lambda M: M[run, jnp.minimum(k, M.shape[1] - 1)], steps)

@@ -137,3 +137,14 @@ def test_a_vehicle_that_nearly_runs_away_raises_nothing():
     model = dataclasses.replace(whole.model, only=dataclasses.replace(whole.model.whole, theta=far))
     found = simulated(dataclasses.replace(whole, model=model), 1)
     assert np.all(np.isneginf(found))
+
+
+def test_blocks_that_count_are_those_in_which_something_was_measured():
+    """Claim: of two runs, one shorter and both padded, the blocks counted are those whose products are not empty."""
+    fit = fitted()
+    view = look(dataclasses.replace(fit, runs=fit.runs.padded()))
+    counts = view.measured_by_part(24)
+    products, logarithms = view.products(view.base, view.disturbance, 24)
+    assert counts.sum() == int(np.asarray(view.followed.system.measured).sum())
+    np.testing.assert_array_equal(counts > 0, (logarithms != 0.0) | np.any(products != 0.0, axis=(1, 2)))
+    assert 0 < np.sum(counts == 0) < 24
