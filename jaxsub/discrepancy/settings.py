@@ -19,7 +19,8 @@ NEGLIGIBLE: Final[float] = 1e-6
 
 # Candidates and evidence
 
-# level at which a candidate, a force (both corrected for all tried) or a fitted amplitude is significant
+# level at which a candidate, a force (both corrected for all tried) or a fitted amplitude is significant, and at which
+# a model with more predicts better: several are compared in one diagnosis, at two horizons each
 SIGNIFICANCE: Final[float] = 0.01
 # share of a candidate's sensitivity that the free parameters must leave for it to be identifiable
 IDENTIFIABLE_SHARE: Final[float] = 1e-4
@@ -79,7 +80,7 @@ LINEARISATION_LOSS: Final[float] = 0.1
 
 # Acceptance
 
-# level of one test: that a model predicts better or worse, of a filter's alarm, of a regime; and of confidence bounds
+# level of one test: that a model predicts worse, of a filter's alarm, of a regime; and of confidence bounds
 LEVEL: Final[float] = 0.05
 # blocks of each run that the others predict, by simulation; and at least of all runs where candidates are proposed
 BLOCKS: Final[int] = 4

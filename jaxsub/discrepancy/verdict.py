@@ -10,7 +10,7 @@ from .decisions import Decision
 from .diagnosis import Verdict
 from .generic import Pattern
 from .name import Named, Naming
-from .settings import CERTAIN, CLEAR_LOG_BAYES, EXPLAINED, LEVEL, RESIDUAL_LEVEL, SIGNIFICANCE, UNEXPLAINED_LEVEL
+from .settings import CERTAIN, CLEAR_LOG_BAYES, EXPLAINED, RESIDUAL_LEVEL, SIGNIFICANCE, UNEXPLAINED_LEVEL
 from .whiteness import Memory
 
 
@@ -108,7 +108,7 @@ def _decisions(label: str, gain: Comparison) -> list[Decision]:
     outcome = "accepted" if gain.accepted else "rejected"
     horizons = {"one step ahead": gain.one_step, "simulation": gain.simulation}
     test = "p-value of the gain in cross-validated log predictive density"
-    said = [Decision(label, f"{test}, {name}", one.better, LEVEL, outcome) for name, one in horizons.items()]
+    said = [Decision(label, f"{test}, {name}", one.better, SIGNIFICANCE, outcome) for name, one in horizons.items()]
     if not gain.admissible:
         said.append(Decision(label, "admissible and significant numbers", 0.0, 1.0, outcome))
     return said
