@@ -59,7 +59,7 @@ class Naming:
     - `products`: at the disturbance that is left. `columns`: of what was chosen. `value`: its log evidence.
     - `again`: whether a free run asked for the last, so that one should look again with it in the model.
     - `first`: the scan before any choice; `candidates`: its lines for the report.
-    - `first_p`: p-value of the first choice.
+    - `first_p`: family-wise p-value of the largest score before any choice.
     """
 
     named: list[Named]
@@ -140,12 +140,13 @@ def _without_idle(selector: Selector, chosen: list[int]) -> list[int]:
 
 def name(selector: Selector, progress: Progress) -> Naming:
     """The effects that the recordings ask for, with probabilities."""
-    chosen, scans, p_values = select(selector, progress)
+    chosen, scans, _ = select(selector, progress)
     value, products = selector.evidence.best(selector.columns(chosen))
     named = standing(selector, chosen)
     lines = table(selector, scans[0])
     again = any(i in selector.freely for i in chosen)
-    return Naming(named, products, selector.columns(chosen), value, again, scans[0], lines, p_values[0])
+    first_p = selector.smallest_p_value(scans[0])
+    return Naming(named, products, selector.columns(chosen), value, again, scans[0], lines, first_p)
 
 
 def standing(selector: Selector, chosen: Sequence[int], refused: Collection[int] = ()) -> list[Named]:

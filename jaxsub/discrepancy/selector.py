@@ -12,6 +12,7 @@ from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numb
 from ..likelihood import Disturbance
 from .columns import plausible
 from .evidence import FIRST, Evidence, Products
+from .multiplicity import family_wise, independent_tests
 from .settings import (
     IDENTIFIABLE_SHARE,
     LARGE_ERROR,
@@ -41,8 +42,25 @@ class Scan:
 
     value: np.ndarray
     statistic: np.ndarray
-    effects: list[AbstractEffect]
+    effects: Sequence[AbstractEffect]
     right: np.ndarray
+
+
+class _Predicted(Sequence[AbstractEffect]):
+    """Candidates with predicted amplitudes, each made when it is asked for: few ever are."""
+
+    def __init__(self, candidates: Sequence[AbstractEffect], sizes: Sequence[np.ndarray]):
+        self._candidates, self._sizes = candidates, sizes
+
+    def __len__(self) -> int:
+        return len(self._candidates)
+
+    def __getitem__(self, index):
+        return predict(self._candidates[index], self._sizes[index])[0]
+
+    def admissible(self, index: int) -> bool:
+        """Whether physics admits the numbers of one of them."""
+        return predictable(self._candidates[index], self._sizes[index])
 
 
 class Selector:
@@ -64,11 +82,10 @@ class Selector:
         forms = collections.Counter(effect.name for effect in self.candidates)
         # every name is as probable as any other before the data, and within a name every form
         self.prior = -np.log([looked_at.get(effect.name, forms[effect.name]) for effect in self.candidates])
-        # forms on the grid of one effect are one trial; where they were chosen among more, each of those has its share
-        listed = {(effect.label, *effect.symbols()) for effect in self.candidates}
+        # where candidates were chosen among more, each of those has its share
         labels = collections.Counter(effect.name for effect in {e.label: e for e in self.candidates}.values())
         among = [looked_at.get(effect.name, 0) / labels[effect.name] for effect in self.candidates]
-        self.tried = len(listed) * np.maximum(among, 1.0)
+        self.forms = np.maximum(among, 1.0)
         self._begin()
 
     def _begin(self) -> None:
@@ -79,6 +96,9 @@ class Selector:
         present = {effect.label for effect in self.evidence.view.vehicle.effects}
         absent = np.array([effect.label not in present for effect in self.candidates], bool)
         self.usable = np.isfinite(self.kept) & (self.kept > IDENTIFIABLE_SHARE) & absent
+        asked = [own for own, use in zip(self.owners, self.usable, strict=True) if use]
+        squares, _ = self.evidence.products[0].remaining([], range(len(self.evidence.length)))
+        self.tests = independent_tests(squares, asked, 1.0 / self.evidence.products[0].samples)
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Selector":
         """The same candidates asked of a view that `Evidence.seen_from` takes."""
@@ -117,14 +137,15 @@ class Selector:
                 # twice the gain in likelihood, the disturbances of both their own
                 best[i], sizes[i] = values[i], gains.amplitudes[i]
                 statistic[i] = max(0.0, gains.statistic[i] + 2.0 * (at - base))
+        effects = _Predicted(
+            self.candidates, [a / self.evidence.length[o] for a, o in zip(sizes, self.owners, strict=True)]
+        )
         taken = {self.candidates[i].label for i in chosen}
-        effects, right = [], []
+        right = []
         for i, effect in enumerate(self.candidates):
-            predicted, good = predict(effect, sizes[i] / self.evidence.length[self.owners[i]])
-            effects.append(predicted)
-            good = good and bool(self.usable[i]) and effect.label not in taken
+            good = bool(self.usable[i]) and effect.label not in taken and effects.admissible(i)
             # worth a look only where it may be chosen
-            right.append(good and (statistic[i] < PLAUSIBILITY_SCORE or plausible(self.evidence.view, predicted)))
+            right.append(good and (statistic[i] < PLAUSIBILITY_SCORE or plausible(self.evidence.view, effects[i])))
         fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= MOST_COLUMNS)
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
@@ -206,16 +227,23 @@ class Selector:
         return bool(np.sum(with_it.predicted(after)) > np.sum(without.predicted(before)))
 
     def p_value(self, index: int, scan: Scan) -> float:
-        """Of a candidate's χ², corrected for all that were tried."""
-        return min(1.0, float(self.tried[index] * special.chdtrc(len(self.owners[index]), scan.statistic[index])))
+        """Of a candidate's χ², family-wise: that so small a p-value is the smallest of all candidates' by chance."""
+        own = self.forms[index] * special.chdtrc(len(self.owners[index]), scan.statistic[index])
+        return family_wise(float(own), self.tests)
+
+    def smallest_p_value(self, scan: Scan) -> float:
+        """Of all candidates' χ², family-wise; uniform where nothing is missing beside what a scan is on top of."""
+        return min((self.p_value(int(i), scan) for i in np.flatnonzero(self.usable)), default=1.0)
 
 
 def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:
     """An effect with predicted numbers, and whether physics admits them."""
-    names = amplitudes(effect)
-    if names:
-        values = dict(zip(names, amplitude.tolist(), strict=True))
-        found = with_numbers(effect, values)
-        return found, admissible(effect, {**numbers(effect), **values})
+    values = dict(zip(amplitudes(effect), amplitude.tolist(), strict=False))
+    return with_numbers(effect, values) if values else effect, predictable(effect, amplitude)
+
+
+def predictable(effect: AbstractEffect, amplitude: np.ndarray) -> bool:
+    """Whether physics admits an effect with these amplitudes."""
+    values = dict(zip(amplitudes(effect), amplitude.tolist(), strict=False))
     # a lag that wants to be of the other sign shows as a negative share of its own grid value
-    return effect, bool(amplitude[0] > 0.0)
+    return admissible(effect, {**numbers(effect), **values}) if values else bool(amplitude[0] > 0.0)

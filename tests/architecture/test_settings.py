@@ -22,7 +22,8 @@ ALLOWED = {
         "view.py": {"_DOUBTED", "_QUIET", "_LEAST_WHITE"},
     },
     "is the resolution of a grid, a difference or a random test": {
-        "columns.py": {"_NUDGE"}, "hats.py": {"_CHOOSING"}, "process_noise.py": {"_SEED"}, "regime.py": {"_SHIFTS"},
+        "columns.py": {"_NUDGE"}, "hats.py": {"_CHOOSING"}, "multiplicity.py": {"_DRAWS", "_SEED"},
+        "process_noise.py": {"_SEED"}, "regime.py": {"_SHIFTS"},
         "smoothness.py": {"FINE", "_SIZES"}, "tones.py": {"_LINES"}, "validation.py": {"_DELAYS"},
         "stiffness.py": {"FINEST", "_TOO_MUCH", "_FOLLOWED", "_UNSEEN", "_SMALL"},
     },
