@@ -16,6 +16,10 @@ TABLE = {
     "two effects of ≥ 3σ": (("pair",), 0.90, None),
     "three effects of ≥ 3σ": (("triple",), 0.75, None),
     "an effect outside the vocabulary": (("outside",), 0.90, 0.90),
+    "σ of every channel unknown": (("estimated",), 0.95, None),
+    "outliers or a sensor that drops out": (("outliers", "dropout"), 0.95, None),
+    "noise that varies, or quantised sensors": (("varying_noise", "quantised"), 0.95, None),
+    "sensors at 1 Hz, or half of the samples lost": (("slow", "uneven"), 0.95, None),
     "nothing concealed": (("none_white", "none_coloured", "none_half", "none_double"), 0.97, None),
 }
 SIZE = (

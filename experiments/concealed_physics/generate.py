@@ -12,6 +12,7 @@ from jaxsub.vehicle import AbstractVehicle, write_vehicle
 
 from .bodies import INTERVAL, NO_VELOCITY, body, commands, start_state
 from .hydrostatics import temperature
+from .logs import LOGGED, white
 from .plan import Case
 from .simulate import Drive, outputs
 from .sizing import Unabsorbed
@@ -61,11 +62,11 @@ def generate(case: Case, folder: Path) -> dict:
         shown, states = (np.asarray(a) for a in outputs(vehicle, truths, sizes, pushed))
     if not np.all(np.isfinite(shown)):
         return truth | {"reached": [0.0] * len(reached)}
-    measured = shown + sigma * rng.standard_normal(shown.shape)
+    measured = LOGGED.get(case.condition, white)(shown, sigma, rng)
     stated = sigma * STATED.get(case.noise, 1.0)
-    errors = np.sqrt(np.mean(((measured - ideal)[-1] / stated) ** 2, axis=0))
+    errors = np.sqrt(np.nanmean(((measured - ideal)[-1] / stated) ** 2, axis=0))
     truth["floor"] = dict(zip(layout.channels, errors.tolist(), strict=True))
-    _write(folder, vehicle, stated, measured, held, states, rng)
+    _write(folder, vehicle, None if case.condition == "estimated" else stated, measured, held, states, rng)
     return truth
 
 
@@ -93,14 +94,15 @@ def _disturbance(vehicle: AbstractVehicle, drive: Drive, sigma: np.ndarray, rng:
 
 
 def _write(
-    folder: Path, vehicle: AbstractVehicle, stated: np.ndarray, measured: np.ndarray, held: np.ndarray,
+    folder: Path, vehicle: AbstractVehicle, stated: np.ndarray | None, measured: np.ndarray, held: np.ndarray,
     states: np.ndarray, rng: np.random.Generator,
 ) -> None:  # fmt: skip
     layout = vehicle.layout
+    sigma = [None] * len(layout.outputs) if stated is None else stated.tolist()
     values = vehicle.values()
     off = {p.name: rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.2) for p in layout.free}
     guess = vehicle.with_values({name: values[name] * (1.0 + share) for name, share in off.items()})
-    outs = tuple(dataclasses.replace(o, sigma=float(s)) for o, s in zip(layout.outputs, stated, strict=True))
+    outs = tuple(dataclasses.replace(o, sigma=s) for o, s in zip(layout.outputs, sigma, strict=True))
     guess = dataclasses.replace(guess, layout=dataclasses.replace(layout, outputs=outs))
     folder.mkdir(parents=True, exist_ok=True)
     write_vehicle(guess, folder / "vehicle.toml")

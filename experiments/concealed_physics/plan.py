@@ -12,7 +12,9 @@ STRONG, WEAK, FAINT = (3.0, 5.0, 10.0, 20.0), (1.0, 2.0), (0.5,)
 COUNTS: dict[str, tuple[int, int]] = {
     "strong": (88, 2), "weak": (88, 1), "faint": (11, 0), "no_velocity": (38, 1), "coloured": (44, 1),
     "sigma": (44, 1), "pair": (20, 1), "triple": (12, 1), "outside": (16, 1), "short": (16, 0), "none_white": (10, 1),
-    "none_coloured": (10, 1), "none_half": (10, 1), "none_double": (10, 1),
+    "none_coloured": (10, 1), "none_half": (10, 1), "none_double": (10, 1), "estimated": (8, 0),
+    "varying_noise": (8, 0), "outliers": (8, 0), "dropout": (8, 0), "slow": (8, 0), "uneven": (8, 0),
+    "quantised": (8, 0),
 }  # fmt: skip
 _SALT = 20_000
 
