@@ -22,7 +22,7 @@ from jaxtyping import Float
 from scipy.linalg import block_diag
 
 from ..estimate import estimate_disturbance
-from ..likelihood import Columns, Disturbance
+from ..likelihood import Columns, Disturbance, padded_width
 from .columns import force_columns
 from .leading import root_or_one
 from .settings import DISTURBANCE_SHARES, MOST_COLUMNS
@@ -91,16 +91,20 @@ class Products:
     def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> Gains:
         """What each further candidate would add to `chosen`."""
         left = self._left(chosen)
-        evidence, statistic, sizes = [], [], []
-        for own in owners:
-            at = [1 + c for c in own]
-            block = left[np.ix_(at, at)] + np.eye(len(at)) / self.samples
-            amplitude = np.linalg.solve(block, left[at, 0])
-            occam = np.linalg.slogdet(block * self.samples)[1]
-            statistic.append(left[at, 0] @ amplitude)
-            evidence.append(0.5 * (statistic[-1] - occam))
-            sizes.append(amplitude)
-        return Gains(np.array(evidence), np.array(statistic), sizes)
+        evidence, statistic = np.zeros(len(owners)), np.zeros(len(owners))
+        sizes = [np.zeros(0)] * len(owners)
+        # all candidates with as many columns at once
+        for count in {len(own) for own in owners}:
+            alike = [i for i, own in enumerate(owners) if len(own) == count]
+            at = 1 + np.array([list(owners[i]) for i in alike], int).reshape(-1, count)
+            block = left[at[:, :, None], at[:, None, :]] + np.eye(count) / self.samples
+            across = left[at, 0]
+            amplitude = np.linalg.solve(block, across[..., None])[..., 0]
+            statistic[alike] = np.sum(across * amplitude, axis=1)
+            evidence[alike] = 0.5 * (statistic[alike] - np.linalg.slogdet(block * self.samples)[1])
+            for i, size in zip(alike, amplitude, strict=True):
+                sizes[i] = size
+        return Gains(evidence, statistic, sizes)
 
     def remaining(self, chosen: Sequence[int], more: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
         """Products of the candidate columns `more` and theirs with the residual, less what `chosen` take up."""
@@ -176,7 +180,13 @@ class Products:
 
 @dataclasses.dataclass(frozen=True)
 class Evidence:
-    """A view, its columns with those of all candidates in units of their length, and their products."""
+    """A view, its columns with those of all candidates, and their products.
+
+    **Fields**
+
+    - `whole`: the residual, free parameters and q candidates, padded to the width of a program. `length`: (q,) that of
+      each candidate's column under the view's disturbance, of which `products` have them in units.
+    """
 
     view: View
     whole: Columns
@@ -187,19 +197,26 @@ class Evidence:
     def of(cls, view: View, columns: Columns, disturbances: Sequence[Disturbance] = ()) -> "Evidence":
         """Under the given disturbances, or shares of the view's."""
         own, known = view.disturbance, len(view.prior)
-        first = cls(view, view.base + columns, np.ones(columns.shown.shape[-1]), []).under(own)
+        count = columns.shown.shape[-1]
+        raw = cls(view, (view.base + columns).padded(padded_width(known + count)), np.ones(count), [])
+        first = raw.under(own)
         length = root_or_one(np.diag(first.gram)[known:])
-        made = cls(view, view.base + jax.tree.map(lambda column: column / length, columns), length, [])
+        made = dataclasses.replace(raw, length=length)
         shares = [own, *(dataclasses.replace(own, force=share * own.force) for share in DISTURBANCE_SHARES[1:])]
         for disturbance in disturbances or shares:
-            known_already = first.scaled(np.concatenate([np.ones(known), length])) if disturbance is own else None
-            made.products.append(known_already or made.under(disturbance))
+            made.products.append(first.scaled(made._unit) if disturbance is own else made.under(disturbance))
         return made
+
+    @property
+    def _unit(self) -> Float[np.ndarray, " n"]:
+        """What each column is divided by, the residual's and the free parameters' included."""
+        return np.concatenate([np.ones(len(self.view.prior)), self.length])
 
     def under(self, disturbance: Disturbance) -> Products:
         """The products under a disturbance."""
-        view = self.view
+        view, unit = self.view, self._unit
         parts, spreads = view.products(self.whole, disturbance)
+        parts = parts[:, : len(unit), : len(unit)] / np.outer(unit, unit)
         gram, known = parts.sum(axis=0), len(view.prior)
         gram[:known, :known] += view.prior
         samples = int(np.sum(np.asarray(view.followed.system.measured)))
@@ -207,9 +224,10 @@ class Evidence:
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Evidence":
         """Of a view along the same path whose residual and free parameters are sums `keep` (1 + p, 1 + m) of these."""
-        candidates = jax.tree.map(lambda column: column[..., len(keep) :], self.whole)
+        candidates = jax.tree.map(lambda column: column[..., len(keep) : len(keep) + len(self.length)], self.whole)
         products = [one.seen_from(keep) for one in self.products]
-        return Evidence(view, view.base + candidates, self.length, products)
+        whole = view.base + candidates
+        return Evidence(view, whole.padded(padded_width(whole.shown.shape[-1])), self.length, products)
 
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
@@ -223,13 +241,14 @@ class Evidence:
 
     def left(self, chosen: Sequence[int], products: Products) -> Columns:
         """The residual, less what free parameters and `chosen` take up of it according to `products`."""
-        weights = products.weights(chosen)
-        return jax.tree.map(lambda column: (column @ weights)[..., None], self.whole)
+        weights = products.weights(chosen) / self._unit
+        return jax.tree.map(lambda column: (column[..., : len(weights)] @ weights)[..., None], self.whole)
 
     def picked(self, chosen: Sequence[int]) -> Columns:
-        """Some of the candidates' columns."""
-        at = len(self.view.prior) + np.array(chosen, int)
-        return jax.tree.map(lambda column: column[..., at], self.whole)
+        """Some of the candidates' columns, of unit length."""
+        own = np.array(chosen, int)
+        at = len(self.view.prior) + own
+        return jax.tree.map(lambda column: column[..., at] / self.length[own], self.whole)
 
     def best(self, chosen: Sequence[int]) -> tuple[float, Products]:
         """The largest log evidence of `chosen` over the disturbances, and the products where it is."""

@@ -98,7 +98,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     mean, _ = smoothed(under[-1].disturbance, view.followed.system, left)
     weighed = promising(view, forces, np.asarray(mean))
     asked = [
-        dataclasses.replace(p.disturbance, force=share * p.disturbance.force)
+        p.disturbance if share == 1.0 else dataclasses.replace(p.disturbance, force=share * p.disturbance.force)
         for p in under
         for share in FORCE_DISTURBANCE_SHARES
     ]
