@@ -24,7 +24,7 @@ from scipy import special
 from ..arrays import quietly
 from ..estimate import Fit, Problem
 from .evidence import conditional
-from .settings import BLOCKS, BLOCKS_ONE_STEP, LEVEL, SIGNIFICANCE
+from .settings import BLOCKS, BLOCKS_ONE_STEP, CLEAR_LOG_BAYES, LEVEL, SIGNIFICANCE
 from .view import View
 
 
@@ -66,11 +66,20 @@ class Comparison(NamedTuple):
     admissible: bool
 
     @property
+    def unlikelier(self) -> bool:
+        """Whether it is clearly less probable one step ahead, significantly by blocks or not."""
+        return self.one_step.total < -CLEAR_LOG_BAYES
+
+    @property
     def accepted(self) -> bool:
-        """Whether it is better at one horizon and worse at none, with admissible numbers."""
+        """Whether it is better at one horizon and worse at none, with admissible numbers.
+
+        One step ahead a clear loss is enough to be worse: these densities are of a noise model that was estimated.
+        Squared simulation errors are no density where the vehicle is disturbed.
+        """
         horizons = (self.one_step, self.simulation)
         better, worse = (min(getattr(gain, side) for gain in horizons) for side in ("better", "worse"))
-        return self.admissible and better < SIGNIFICANCE and not worse < LEVEL
+        return self.admissible and better < SIGNIFICANCE and not (self.unlikelier or worse < LEVEL)
 
 
 def compare(before: Predicted, after: Predicted, admissible: bool = True) -> Comparison:
@@ -118,8 +127,9 @@ def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
 def simulated(fit: Fit, blocks: int = BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
     """`Predicted.simulation` of a fit, in so many `blocks` a run; the initial states may be `known_start`."""
     products = _simulation_products(fit, blocks)
+    nowhere = np.full(products.shape[0] * products.shape[1], -np.inf)
     if not np.all(np.isfinite(products)):
-        return np.full(products.shape[0] * products.shape[1], -np.inf)
+        return nowhere
     problem, free = fit.problem, len(fit.names)
     prior = np.diag(np.asarray(problem.prior_std, float) ** -2.0)
     spread = np.zeros_like(problem.spread) if known_start else np.asarray(problem.spread)
@@ -128,7 +138,11 @@ def simulated(fit: Fit, blocks: int = BLOCKS, *, known_start: bool = False) -> F
     products = products * scale[:, None] * scale
     # each run's initial state is optimal, and follows the other numbers by Y
     whole = products.sum(axis=1)
-    Y = np.linalg.solve(whole[:, own, own] + np.eye(len(spread)), whole[:, own, : 1 + free])
+    try:
+        Y = np.linalg.solve(whole[:, own, own] + np.eye(len(spread)), whole[:, own, : 1 + free])
+    except np.linalg.LinAlgError:
+        # products so large that adding one changes none of them are of a model that nearly diverges
+        return nowhere
     Y[..., 0] = 0.0
     follow = np.concatenate([np.broadcast_to(np.eye(1 + free), (len(Y), 1 + free, 1 + free)), -Y], axis=1)
     reduced = np.einsum("rqa,rbqs,rsc->rbac", follow, products, follow).reshape(-1, 1 + free, 1 + free)

@@ -109,6 +109,9 @@ def _decisions(label: str, gain: Comparison) -> list[Decision]:
     horizons = {"one step ahead": gain.one_step, "simulation": gain.simulation}
     test = "p-value of the gain in cross-validated log predictive density"
     said = [Decision(label, f"{test}, {name}", one.better, SIGNIFICANCE, outcome) for name, one in horizons.items()]
+    if gain.unlikelier:
+        test = "gain in cross-validated log predictive density, one step ahead"
+        said.append(Decision(label, test, gain.one_step.total, -CLEAR_LOG_BAYES, outcome))
     if not gain.admissible:
         said.append(Decision(label, "admissible and significant numbers", 0.0, 1.0, outcome))
     return said

@@ -83,6 +83,15 @@ def test_accepted_is_what_is_better_at_one_horizon_and_worse_at_none(one_step, s
     assert found.accepted is accepted
 
 
+@pytest.mark.parametrize(("total", "accepted"), [(-2.0, True), (-4.0, False)])
+def test_a_clear_loss_one_step_ahead_is_not_made_good_by_simulation(total, accepted):
+    """Claim: what simulates better is rejected where its density one step ahead is clearly lower; a record says so."""
+    found = Comparison(Gain(total, 0.8, 0.2), Gain(100.0, 1e-3, 0.999), 0.5, True)
+    assert found.accepted is accepted
+    decisions = helped(NOTHING, CubicDamping("x", -1.0), found).decisions
+    assert decisions[-1].test.startswith("gain in") is not accepted
+
+
 def test_a_block_one_step_ahead_has_its_gaussian_conditional_density():
     """Claim: it is the density of its whitened innovations given those of the other blocks, by dense covariances."""
     view = look(fitted())
