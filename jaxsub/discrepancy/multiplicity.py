@@ -20,10 +20,10 @@ from .settings import SIGNIFICANCE
 _DRAWS, _SEED = 10_000, 0
 
 
-def independent_tests(squares: Float[np.ndarray, "q q"], owners: Sequence[Sequence[int]], worth: float) -> float:
+def independent_tests(squares: Float[np.ndarray, "q q"], owners: Sequence[Sequence[int]], precision: float) -> float:
     """The number of independent tests that candidates are worth, by the products `squares` of their columns.
 
-    `owners` are the columns of each, `worth` the precision of an amplitude's prior. At least one.
+    `owners` are the columns of each, `precision` that of an amplitude's prior. At least one.
     """
     if not owners:
         return 1.0
@@ -37,7 +37,7 @@ def independent_tests(squares: Float[np.ndarray, "q q"], owners: Sequence[Sequen
     largest: dict[int, np.ndarray] = {}
     for own in owners:
         at = [place[column] for column in own]
-        statistic = np.sum(b[at] * np.linalg.solve(G[np.ix_(at, at)] + worth * np.eye(len(at)), b[at]), axis=0)
+        statistic = np.sum(b[at] * np.linalg.solve(G[np.ix_(at, at)] + precision * np.eye(len(at)), b[at]), axis=0)
         largest[len(at)] = np.maximum(largest.get(len(at), 0.0), statistic)
     p = np.min([special.chdtrc(size, most) for size, most in largest.items()], axis=0)
     quantile = min(float(np.quantile(p, SIGNIFICANCE)), SIGNIFICANCE)

@@ -46,7 +46,7 @@ class Scan:
     right: np.ndarray
 
 
-class _Predicted(Sequence[AbstractEffect]):
+class _WithAmplitudes(Sequence[AbstractEffect]):
     """Candidates with predicted amplitudes, each made when it is asked for: few ever are."""
 
     def __init__(self, candidates: Sequence[AbstractEffect], sizes: Sequence[np.ndarray]):
@@ -137,7 +137,7 @@ class Selector:
                 # twice the gain in likelihood, the disturbances of both their own
                 best[i], sizes[i] = values[i], gains.amplitudes[i]
                 statistic[i] = max(0.0, gains.statistic[i] + 2.0 * (at - base))
-        effects = _Predicted(
+        effects = _WithAmplitudes(
             self.candidates, [a / self.evidence.length[o] for a, o in zip(sizes, self.owners, strict=True)]
         )
         taken = {self.candidates[i].label for i in chosen}
