@@ -104,6 +104,7 @@ def check(
 @click.option("--effects", type=_PATH, help="A Python script with effects of your own, to be tried too.")
 @click.option("--manoeuvre/--no-manoeuvre", default=True, help="Where rivals remain, look for the run that settles it.")
 @click.option("--budget", metavar="SECONDS", type=click.FloatRange(0.0), help="End with the answer so far after these.")
+@click.option("--begin", type=_PATH, help="improved.toml of an incomplete answer, to go on from.")
 @click.option("--explain", is_flag=True, help="Print every decision: its test, statistic, threshold and outcome.")
 @_columns
 @_overwrite
@@ -116,6 +117,7 @@ def diagnose(
     effects: Path | None,
     manoeuvre: bool,
     budget: float | None,
+    begin: Path | None,
     explain: bool,
     columns: Path | None,
     overwrite: bool,
@@ -123,7 +125,7 @@ def diagnose(
     """Fit, locate the mismatch, name the missing physics, model it, and show it on test runs."""
     from . import diagnose as command
 
-    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns, explain, budget)
+    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns, explain, budget, begin)
 
 
 @app.command()

@@ -14,7 +14,7 @@ from ..discrepancy.decisions import decision_rows
 from ..discrepancy.diagnose import Keep
 from ..discrepancy.next_run import next_run, said
 from ..effects import AbstractEffect, from_script, vocabulary
-from ..errors import OutputError
+from ..errors import InputError, OutputError
 from ..estimate import require_free
 from ..plain import to_json
 from ..recording import Recording, hold_out, save
@@ -40,22 +40,25 @@ def run(
     columns: Path | None = None,
     explain: bool = False,
     budget: float | None = None,
+    begin: Path | None = None,
 ) -> None:
     """Diagnose the recordings at `runs`, shown on the test runs at `held` or on what `hold_out` sets aside.
 
     Effects that the Python file at `script` defines are tried with those that are installed. Of logs the file at
     `columns` says what to take. `explain` prints every decision. After `budget` seconds, or at Ctrl-C, the answer so
     far is given. It is put at `out` after each effect that is accepted, and stays there whatever ends what follows.
+    The vehicle file at `begin` is the improved one of such an answer, from which this one goes on.
     """
     session.start()
-    with fresh_folders(out, overwrite, paths_of(vehicle_path, *runs, *held, script, columns)) as fresh:
+    with fresh_folders(out, overwrite, paths_of(vehicle_path, *runs, *held, script, columns, begin)) as fresh:
         own = () if script is None else from_script(script)
         vehicle = read_vehicle(vehicle_path, own)
         require_free(vehicle, str(vehicle_path))
+        first = () if begin is None else _added(vehicle, begin, own)
         recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
         train, test = (recordings, unseen) if held else hold_out(recordings)
         keep = lambda diagnosis, improved: _keep(Answer(diagnosis, improved, None), fresh, out)
-        answer = diagnosed(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget, keep)
+        answer = diagnosed(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget, keep, first)
         # shown before it is written: where writing fails, minutes of work are not lost
         answer.emit(explain)
         with fresh() as folder:
@@ -64,6 +67,15 @@ def run(
     if not answer.diagnosis.complete and (watch := options().watch) is not None and watch.interrupted:
         options().kept = _held(answer, out)
         raise KeyboardInterrupt
+
+
+def _added(vehicle: AbstractVehicle, improved: Path, own: tuple[type[AbstractEffect], ...]) -> list[AbstractEffect]:
+    """The effects that the vehicle file `improved` has more than a vehicle."""
+    there = {effect.label for effect in vehicle.effects}
+    found = [effect for effect in read_vehicle(improved, own).effects if effect.label not in there]
+    if not found:
+        raise InputError(str(improved), "has no effect that the vehicle lacks", "leave out --begin")
+    return found
 
 
 def _keep(answer: "Answer", fresh: Fresh, out: Path) -> None:
@@ -114,11 +126,13 @@ def diagnosed(
     manoeuvre: bool = True,
     budget: float | None = None,
     keep: Keep = lambda diagnosis, improved: None,
+    begin: Sequence[AbstractEffect] = (),
 ) -> Answer:
     """Diagnose `vehicle` by the runs `train`, shown on `test`, trying effects of `kinds`: all installed where None.
 
     Where rivals remain and a `manoeuvre` is wanted, inputs that would tell them apart are looked for. After `budget`
-    seconds, or once interrupted, no further effect is tried. Each answer on the way is given to `keep`.
+    seconds, or once interrupted, no further effect is tried. Each answer on the way is given to `keep`. Effects to
+    `begin` with come before any other.
     """
     watch = options().watch
     with terminal.progress(f"diagnosing {vehicle.layout.name}") as told, ExitStack() as kept:
@@ -130,9 +144,8 @@ def diagnosed(
                 kept.enter_context(watch.heeded())
 
         stop = lambda: watch is not None and watch.interrupted
-        diagnosis, improved = diagnose_runs(
-            vehicle, train, test, vocabulary=kinds, progress=told, budget=budget, stop=stop, keep=keep_and_heed
-        )
+        given = {"progress": told, "budget": budget, "stop": stop, "keep": keep_and_heed, "begin": begin}
+        diagnosis, improved = diagnose_runs(vehicle, train, test, vocabulary=kinds, **given)
         kept.close()
         if not (manoeuvre and diagnosis.explanations and diagnosis.complete):
             return Answer(diagnosis, improved, None)

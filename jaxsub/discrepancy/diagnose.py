@@ -51,6 +51,7 @@ def diagnose(
     budget: float | None = None,
     stop: Callable[[], bool] = lambda: False,
     keep: Keep = lambda diagnosis, improved: None,
+    begin: Sequence[AbstractEffect] = (),
 ) -> tuple[Diagnosis, AbstractVehicle]:
     """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `test`.
 
@@ -58,8 +59,9 @@ def diagnose(
     the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` is told what is
     being done. After `budget` seconds, or once `stop()` is true, no further effect is tried, and the answer so far is
     given, which then is not `complete`. Each answer on the way is given to `keep`: one more effect was accepted, and
-    the test runs were not looked at yet. **Raises** `InputError` where the recordings lack a column, or the model does
-    not run from the vehicle file's values or diverges along the recordings.
+    the test runs were not looked at yet. Effects to `begin` with, as of an earlier answer, come before any other, if
+    they are accepted together. **Raises** `InputError` where the recordings lack a column, the model does not run from
+    the vehicle file's values or diverges along the recordings, or `begin` has what the recordings cannot ask for.
     """
     until = limited(progress, budget, stop)
     progress("fitting the baseline")
@@ -78,7 +80,7 @@ def diagnose(
     trial, baseline = Trial(until, vehicle), fitted_model(start, found.view, ())
     account = _Account(vehicle, train, found, field, baseline)
     so_far = lambda model, judged: keep(*account.of(model, model, judged, ()))
-    named, judged, left = explained(trial, baseline, found, vocabulary, so_far)
+    named, judged, left = explained(trial, baseline, found, vocabulary, so_far, begin)
     best, judged = (named, judged) if left is None else described(trial, named, left, judged, vocabulary)
     if best.pieces > 1:
         account = dataclasses.replace(account, baseline=in_pieces(baseline, best.pieces))

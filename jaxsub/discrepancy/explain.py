@@ -1,17 +1,20 @@
 """What the recordings ask for, tried and asked again until what is left is random, refused or without a name."""
 
+import dataclasses
 from collections.abc import Callable, Generator, Sequence
 
 from ..effects import AbstractEffect
+from ..errors import InputError
 from ..results import RESULTS
 from .cross_validation import compare
 from .evidence import evidence_of
 from .examine import examine, weighed
 from .many import by_what_comes_next
+from .name import standing
 from .progress import OutOfTime
 from .settings import EXPLAINED, MAJORITY, MOST_EFFECTS, MOST_REJECTIONS
 from .trial import Found, Model, Trial, tried, worth_trying
-from .verdict import NOTHING, Judged, both, by_fit, idle, incomplete, judge
+from .verdict import NOTHING, Judged, both, by_fit, helped, idle, incomplete, judge, settled
 from .whiteness import share_of
 
 # a model, what is to be said with it, and the last look at what it leaves, if anything may be left
@@ -24,12 +27,13 @@ def explained(
     found: Found,
     vocabulary: tuple[type[AbstractEffect], ...] | None,
     keep: Callable[[Model, Judged], object] = lambda model, judged: None,
+    begin: Sequence[AbstractEffect] = (),
 ) -> Answer:
     """The model with what can be named, as `answers` ends; the answer so far where it is ended before.
 
     Each answer before the last is given to `keep`.
     """
-    rounds = answers(trial, baseline, found, vocabulary)
+    rounds = answers(trial, baseline, found, vocabulary, begin)
     last: tuple[Model, Judged] | None = None
     try:
         while True:
@@ -43,9 +47,15 @@ def explained(
 
 
 def answers(
-    trial: Trial, baseline: Model, found: Found, vocabulary: tuple[type[AbstractEffect], ...] | None
+    trial: Trial,
+    baseline: Model,
+    found: Found,
+    vocabulary: tuple[type[AbstractEffect], ...] | None,
+    begin: Sequence[AbstractEffect] = (),
 ) -> Generator[tuple[Model, Judged], None, Answer]:
     """The answer so far after each round of proposals that accepts something; returns the one to be given.
+
+    With effects to `begin` with, which an earlier answer had, the first round is theirs.
 
     Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
     they leave is not random: far from the truth a linear picture shows the largest alone. Where the baseline does not
@@ -59,6 +69,11 @@ def answers(
     ahead = by_what_comes_next(trial, baseline, vocabulary) if told_ahead else None
     if ahead is not None:
         return *ahead, None
+    if begin:
+        best, judged = begun(trial, baseline, found, begin)
+        if judged.named:
+            yield best, judged
+            found = examine(best.view, vocabulary, trial.progress)
     while True:
         said, after = judge(found.naming, found.pattern, found.memory), None
         chosen = worth_trying(found, said)
@@ -87,6 +102,26 @@ def answers(
         if said.named:
             yield best, judged
         found = after or examine(best.view, vocabulary, trial.progress)
+
+
+def begun(trial: Trial, baseline: Model, found: Found, effects: Sequence[AbstractEffect]) -> tuple[Model, Judged]:
+    """The model with the `effects` of an earlier answer, if they are accepted together, and what is to be said.
+
+    Probabilities are those of the first look. **Raises** `InputError` for an effect that is not among its candidates.
+    """
+    selector, labels = found.selector, [effect.label for effect in effects]
+    numbers = []
+    for label in labels:
+        own = [i for i, candidate in enumerate(selector.candidates) if candidate.label == label]
+        if not own:
+            what = f"{label} is not among the effects that these recordings may ask for"
+            raise InputError(trial.file.layout.name, what, "begin without it")
+        numbers.append(max(own, key=lambda i: found.naming.first.value[i]))
+    model = trial.with_effects(baseline, effects, found.naming.products.disturbance)
+    gain = compare(baseline.predicted, model.predicted, model.stands)
+    named = standing(selector, numbers) if gain.accepted else []
+    judged = dataclasses.replace(NOTHING, p_value=min(1.0, 2.0 * found.naming.first_p))
+    return (model if gain.accepted else baseline), settled(helped(judged, ", ".join(labels), gain), named)
 
 
 def without_idle(

@@ -60,7 +60,7 @@ def by_what_comes_next(
         return None
     judged = settled(judged, named)
     for one in named:
-        judged = helped(judged, one.effect, gains[one.effect.label])
+        judged = helped(judged, one.effect.label, gains[one.effect.label])
     return whole, by_all(judged, whole.pieces)
 
 

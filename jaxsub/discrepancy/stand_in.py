@@ -150,8 +150,8 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
         more = _fitted(trial, named, base, [less], disturbance)
         gain = compare(base.predicted, more.predicted, more.admitted)
         if gain.accepted and more.view.finite:
-            return more, helped(judged, less, gain)
+            return more, helped(judged, less.label, gain)
         if gain.ratio > last:
             break
         last = gain.ratio
-    return base, helped(judged, force, gain)
+    return base, helped(judged, force.label, gain)

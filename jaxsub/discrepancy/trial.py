@@ -270,7 +270,7 @@ def tried(trial: Trial, base: Model, found: Found, chosen: Sequence[int], judged
         kept = together(tries, chosen) or alone(tries, chosen)
     refused = [index for index, gain in tries.said.items() if index not in kept and not gain.accepted]
     for index in [*refused, *kept]:
-        judged = helped(judged, effects[index], tries.said[index])
+        judged = helped(judged, effects[index].label, tries.said[index])
     # how probable each is was said before twins were fitted, and with what was refused in the model
     if not kept:
         # a fit has found the best shape of its effect: other shapes of it would end there too

@@ -97,9 +97,9 @@ def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory
     return said
 
 
-def helped(judged: Judged, effect: AbstractEffect, gain: Comparison) -> Judged:
-    """The verdict once it is known what is gained by an effect."""
-    notes, decisions = [*judged.notes, _gain_said(effect.label, gain)], _decisions(effect.label, gain)
+def helped(judged: Judged, label: str, gain: Comparison) -> Judged:
+    """The verdict once it is known what is gained by an effect, or by several, of a `label`."""
+    notes, decisions = [*judged.notes, _gain_said(label, gain)], _decisions(label, gain)
     return dataclasses.replace(judged, notes=notes, decisions=[*judged.decisions, *decisions])
 
 
@@ -135,7 +135,8 @@ def _horizon(name: str, gain: Gain) -> str:
 
 def incomplete(judged: Judged) -> Judged:
     """The verdict so far, of a diagnosis that is ended, or not at its end."""
-    tried = "before more candidates were tried" if judged.named else "before any effect was accepted"
+    on = "before more candidates were tried; --begin improved.toml goes on from it"
+    tried = on if judged.named else "before any effect was accepted"
     note = f"This answer is incomplete: it is the one so far, {tried}."
     return dataclasses.replace(judged, notes=[*judged.notes, note], complete=False)
 

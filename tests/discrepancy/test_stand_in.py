@@ -63,12 +63,12 @@ def seen(selector, memory, pattern=None, disturbance=None):
 @pytest.mark.parametrize(
     ("chance", "free", "cost", "left", "known", "stands"),
     [
-        (0.01, 0.98, 0.9, 1e-9, 1.0, True),
+        (1e-3, 0.98, 0.9, 1e-9, 1.0, True),
         (0.5, 0.98, 0.9, 1e-9, 1.0, False),
-        (0.01, 0.995, 0.9, 1e-9, 1.0, False),
-        (0.01, 0.98, 1.1, 1e-9, 1.0, False),
-        (0.01, 0.98, 0.9, 1.0, 1.0, False),
-        (0.01, 0.98, 0.9, 1e-9, np.nan, False),
+        (1e-3, 0.995, 0.9, 1e-9, 1.0, False),
+        (1e-3, 0.98, 1.1, 1e-9, 1.0, False),
+        (1e-3, 0.98, 0.9, 1.0, 1.0, False),
+        (1e-3, 0.98, 0.9, 1e-9, np.nan, False),
     ],
 )
 def test_a_description_joins_where_it_explains_some_of_what_is_left(
@@ -134,7 +134,7 @@ def test_a_force_that_overdoes_it_is_tried_by_halves(monkeypatch, most, worse, a
         return model._replace(predicted=effects[0].spread, added=tuple(effects))
 
     def gained(before, after, admissible):
-        return Comparison(Gain(1.0, 0.01 if after < most else 1.0, 0.5), NO_GAIN, 1.0 + worse / after, admissible)
+        return Comparison(Gain(1.0, 1e-3 if after < most else 1.0, 0.5), NO_GAIN, 1.0 + worse / after, admissible)
 
     monkeypatch.setattr(Trial, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
@@ -166,7 +166,7 @@ def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, er
     monkeypatch.setattr(Trial, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
     monkeypatch.setattr(path, "allowing_for", lambda view, fit: fit)
-    monkeypatch.setattr(path, "compare", lambda *given: Comparison(Gain(1.0, 0.01, 0.99), NO_GAIN, 0.5, True))
+    monkeypatch.setattr(path, "compare", lambda *given: Comparison(Gain(1.0, 1e-3, 0.999), NO_GAIN, 0.5, True))
     monkeypatch.setattr(path, "listed", lambda *_: Freely([], [()], lambda *_: True))
     monkeypatch.setattr(path, "weighed", lambda *_: seen(None, RANDOM))
     selector = Freely([drag], [(0.3,), (0.0,)], lambda *_: True, named.view.disturbance)

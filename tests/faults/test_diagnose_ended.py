@@ -46,11 +46,11 @@ def files(tmp_path_factory):
     return folder
 
 
-def ended(files, out, *numbers):
+def ended(files, out, *numbers, begin=()):
     """Exit code and last line on standard error of a diagnosis that is sent these signals in its second round."""
     runs = [str(files / f"run{number}.csv") for number in range(3)]
     program = PROGRAM.format(numbers=[int(number) for number in numbers])
-    command = [sys.executable, "-c", program, "diagnose", str(files / "vehicle.toml"), *runs, "--out", str(out)]
+    command = [sys.executable, "-c", program, "diagnose", str(files / "vehicle.toml"), *runs, "--out", str(out), *begin]
     done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=600)
     return done.returncode, done.stderr.splitlines()[-1:], json.loads((out / "diagnosis.json").read_text())
 
@@ -73,3 +73,29 @@ def test_a_killed_diagnosis_leaves_the_answer_so_far(files, tmp_path):
     assert (found["complete"], found["verdict"], found["fit"]["held_out"]) == (False, "named", {})
     improved = read_vehicle(tmp_path / "out" / "improved.toml")
     assert [effect.label for effect in improved.effects] == ["quadratic-damping[x]"]
+
+
+def test_the_next_call_goes_on_from_the_answer_so_far(files, tmp_path):
+    """Claim: begun with the killed one's vehicle it names the same effect and numbers as one that nothing ended."""
+    ended(files, tmp_path / "killed", signal.SIGKILL)
+    begin = ["--begin", str(tmp_path / "killed" / "improved.toml")]
+    code, _, found = ended(files, tmp_path / "again", begin=begin)
+    _, _, whole = ended(files, tmp_path / "whole")
+    assert code == 0 and found["complete"] and found["verdict"] == whole["verdict"] == "named"
+    (own,), (reference,) = found["physics"], whole["physics"]
+    assert own["effect"] == reference["effect"] == "quadratic-damping"
+    assert own["parameters"]["D2_x"]["value"] == pytest.approx(reference["parameters"]["D2_x"]["value"], rel=1e-3)
+    # its first decision is about what it was begun with, and nothing is proposed before
+    assert [one["outcome"] for one in found["decisions"][:2]] == ["accepted"] * 2
+    assert whole["decisions"][0]["outcome"] == "proposed"
+
+
+def test_a_vehicle_without_more_effects_begins_nothing(files, tmp_path):
+    """Claim: a vehicle file that adds no effect is refused in one line, and nothing is written."""
+    runs = [str(files / f"run{number}.csv") for number in range(3)]
+    given = [str(files / "vehicle.toml"), *runs, "--out", str(tmp_path / "out"), "--begin", str(files / "vehicle.toml")]
+    program = "from jaxsub.cli import main; main()"
+    command = [sys.executable, "-c", program, "diagnose", *given]
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=600)
+    assert done.returncode == 2 and "has no effect that the vehicle lacks" in done.stderr
+    assert not (tmp_path / "out").exists()
