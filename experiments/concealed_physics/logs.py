@@ -15,22 +15,27 @@ QUANTUM_SIGMAS = 4.0
 QUIET, LOUD = 0.5, 3.0
 
 
+def white(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
+    """Samples (R, K, c) of perfect sensors with white noise of `sigma` (c,)."""
+    return ideal + sigma * rng.standard_normal(ideal.shape)
+
+
 def _varying(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
     """Noise whose size swings between `QUIET` and `LOUD`, three times a run."""
     swing = 0.5 - 0.5 * np.cos(2.0 * np.pi * 3.0 * np.linspace(0.0, 1.0, ideal.shape[1]))
     factor = QUIET + (LOUD - QUIET) * swing
-    return ideal + factor[:, None] * _noise(ideal, sigma, rng)
+    return white(ideal, factor[:, None] * sigma, rng)
 
 
 def _outliers(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
     """A tenth of all samples elsewhere."""
     away = OUTLIER_SIGMAS * rng.uniform(-1.0, 1.0, ideal.shape) * (rng.random(ideal.shape) < OUTLIERS)
-    return ideal + _noise(ideal, sigma, rng) + sigma * away
+    return white(ideal, sigma, rng) + sigma * away
 
 
 def _dropout(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
     """One sensor of each run is silent for some seconds."""
-    measured, count = ideal + _noise(ideal, sigma, rng), round(DROP_OUT_SECONDS / INTERVAL)
+    measured, count = white(ideal, sigma, rng), round(DROP_OUT_SECONDS / INTERVAL)
     for run in measured:
         first = int(rng.integers(len(run) - count))
         run[first : first + count, rng.integers(run.shape[1])] = np.nan
@@ -40,28 +45,19 @@ def _dropout(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Sam
 def _slow(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
     """Sensors once a second, commands as often as before."""
     there = np.arange(ideal.shape[1]) % round(SLOW_SECONDS / INTERVAL) == 0
-    return np.where(there[:, None], ideal + _noise(ideal, sigma, rng), np.nan)
+    return np.where(there[:, None], white(ideal, sigma, rng), np.nan)
 
 
 def _uneven(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
     """Half of the samples of all sensors are lost."""
     there = rng.random(ideal.shape[:2]) < KEPT
-    return np.where(there[..., None], ideal + _noise(ideal, sigma, rng), np.nan)
+    return np.where(there[..., None], white(ideal, sigma, rng), np.nan)
 
 
 def _quantised(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
     """Numbers of so few digits that the noise is less than a step."""
     step = QUANTUM_SIGMAS * sigma
-    return step * np.round((ideal + _noise(ideal, sigma, rng)) / step)
-
-
-def _noise(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
-    return sigma * rng.standard_normal(ideal.shape)
-
-
-def white(ideal: Samples, sigma: np.ndarray, rng: np.random.Generator) -> Samples:
-    """Samples (R, K, c) of perfect sensors with white noise of `sigma` (c,)."""
-    return ideal + _noise(ideal, sigma, rng)
+    return step * np.round(white(ideal, sigma, rng) / step)
 
 
 LOGGED: dict[str, Callable[[Samples, np.ndarray, np.random.Generator], Samples]] = {

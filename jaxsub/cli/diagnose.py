@@ -144,8 +144,17 @@ def diagnosed(
                 kept.enter_context(watch.heeded())
 
         stop = lambda: watch is not None and watch.interrupted
-        given = {"progress": told, "budget": budget, "stop": stop, "keep": keep_and_heed, "begin": begin}
-        diagnosis, improved = diagnose_runs(vehicle, train, test, vocabulary=kinds, **given)
+        diagnosis, improved = diagnose_runs(
+            vehicle,
+            train,
+            test,
+            vocabulary=kinds,
+            progress=told,
+            budget=budget,
+            stop=stop,
+            keep=keep_and_heed,
+            begin=begin,
+        )
         kept.close()
         if not (manoeuvre and diagnosis.explanations and diagnosis.complete):
             return Answer(diagnosis, improved, None)

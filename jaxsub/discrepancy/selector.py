@@ -238,12 +238,18 @@ class Selector:
 
 def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:
     """An effect with predicted numbers, and whether physics admits them."""
-    values = dict(zip(amplitudes(effect), amplitude.tolist(), strict=False))
+    values = _predicted_numbers(effect, amplitude)
     return with_numbers(effect, values) if values else effect, predictable(effect, amplitude)
 
 
 def predictable(effect: AbstractEffect, amplitude: np.ndarray) -> bool:
     """Whether physics admits an effect with these amplitudes."""
-    values = dict(zip(amplitudes(effect), amplitude.tolist(), strict=False))
+    values = _predicted_numbers(effect, amplitude)
     # a lag that wants to be of the other sign shows as a negative share of its own grid value
     return admissible(effect, {**numbers(effect), **values}) if values else bool(amplitude[0] > 0.0)
+
+
+def _predicted_numbers(effect: AbstractEffect, amplitude: np.ndarray) -> dict[str, float]:
+    """The amplitudes by field; none of an effect that is not linear in any."""
+    names = amplitudes(effect)
+    return dict(zip(names, amplitude.tolist(), strict=True)) if names else {}

@@ -117,11 +117,9 @@ class View:
     def measured_by_part(self, pieces: int) -> Int[np.ndarray, " m"]:
         """How many values were measured in each part that `products` makes of the recordings."""
         counts = np.asarray(self.followed.system.measured).sum(axis=-1)
-        begins = part_length(counts.shape[1], pieces) * np.arange(1, pieces)
-        begins = begins[begins < counts.shape[1]]
-        found = [part.sum(axis=1) for part in np.split(counts, begins, axis=1)]
-        empty = [np.zeros(len(counts), int)] * (pieces - len(found))
-        return np.stack([*found, *empty], axis=1).reshape(-1)
+        length = part_length(counts.shape[1], pieces)
+        whole = np.pad(counts, [(0, 0), (0, pieces * length - counts.shape[1])])
+        return whole.reshape(-1, length).sum(axis=1)
 
     def measured(self, channel: str) -> np.ndarray:
         """All samples that `channel` has in the recordings, SI."""
