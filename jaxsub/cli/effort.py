@@ -2,8 +2,11 @@
 
 import contextlib
 import ctypes
+import functools
 import time
 from collections.abc import Callable
+
+import jax
 
 from ..likelihood import block_length
 from ..recording.runs import Runs
@@ -12,12 +15,14 @@ from . import terminal
 
 # samples from which on a command says what it will take
 _LONG = 100_000
-# `identify` on 100 000 rows, jax 0.12, two cores of a shared machine, November 2026, from an empty cache of programs
-# and again: one coordinate, 3 coefficients, 17 s and 6 s of CPU, 0.82 GB and 0.53 GB; six degrees of freedom, 20
-# coefficients that begin 10 to 15 % off, 10 channels, 18 passes: 170 s and 119 s, 1.39 GB and 0.96 GB.
+# `identify`, jax 0.12, one core, November 2026, from an empty cache of programs: one coordinate, 3 coefficients,
+# 1 000 000 rows: 32 s of CPU and 0.84 GB; six degrees of freedom, 16 coefficients, 10 channels: 20 000 rows 45 s and
+# 0.90 GB, 1 000 000 rows 620 s and 1.13 GB.
 # bytes of the program, its compiler and the windows of coloured errors, copies of the recording's columns, and copies
 # of the Jacobian of what is linearised at once: a block, or with actuators or sensors that remember all of it
-_BASE, _COPIES, _OF_JACOBIAN = 1.0e9, 4, 2.5
+_BASE, _COPIES, _OF_JACOBIAN = 0.85e9, 2, 2.5
+# bytes of the program and copies of the columns while these are read
+_READER, _READ = 0.3e9, 7
 # s before and after the passes with programs in the cache and without, each and for each column of the Jacobian
 _KEPT, _COMPILED = (1.8, 0.4), (4.8, 1.5)
 # s for each sample, state and column of the Jacobian in a pass
@@ -32,15 +37,27 @@ _SILENT, _TERMINAL, _PIPE, _TOLD = 2.0, 0.5, 10.0, 0.02
 
 # glibc's number for the size from which on memory is mapped, and that size in bytes
 _M_MMAP_THRESHOLD, _MAPPED = -3, 1_000_000
+# what JAX calls the end of a compilation, or of reading a program from the cache
+_COMPILED_EVENT = "/jax/core/compile/backend_compile_duration"
 
 
+@functools.cache
 def return_memory() -> None:
-    """Let large arrays go back to the system once they are freed, where the C library can be told to.
+    """Let memory go back to the system once it is freed, where the C library can be told to.
 
-    glibc keeps blocks of up to 32 MB, which a million samples of a channel are: 1.7 GB at most and not 1.2 GB.
+    glibc keeps blocks of up to 32 MB, which a million samples of a channel are, and what the compiler freed among what
+    it keeps: 0.3 GB after one large program.
     """
     with contextlib.suppress(OSError, TypeError, AttributeError):
-        ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _MAPPED)
+        library = ctypes.CDLL(None)
+        library.mallopt(_M_MMAP_THRESHOLD, _MAPPED)
+        trim = library.malloc_trim
+
+        def ended(event: str, duration_secs: float, **_: str | int) -> None:
+            if event == _COMPILED_EVENT:
+                trim(0)
+
+        jax.monitoring.register_event_duration_secs_listener(ended)
 
 
 class Effort:
@@ -59,7 +76,9 @@ class Effort:
         if self._samples < _LONG:
             return ""
         jacobian = _OF_JACOBIAN * self._at_once * self._columns * (self._states + self._channels)
-        memory = (_BASE + 8.0 * (_COPIES * self._samples * self._recorded + jacobian)) / 1e9
+        columns = self._samples * self._recorded
+        fitting = _BASE + 8.0 * (_COPIES * columns + jacobian)
+        memory = max(fitting, _READER + 8.0 * _READ * columns) / 1e9
         passes = _PASSES + _OF_COEFFICIENT * self._coefficients
         passing = passes * _EACH * self._samples * self._columns * self._states
         least, most = (passing + fixed + each * self._columns for fixed, each in (_KEPT, _COMPILED))

@@ -38,7 +38,7 @@ from ..likelihood import (
 from ..recording.runs import Runs
 
 # samples that the disturbance of long runs is estimated from: its few numbers gain nothing from more; and of what a
-# filter carries along them, states and forces times columns, which its gradient keeps several times: 0.4 GB in all
+# filter carries along them, states and forces times columns, which its gradient keeps several times: 0.2 GB in all
 _WINDOWS, _LENGTH, _CARRIED = 8, 2500, 3_000_000
 
 

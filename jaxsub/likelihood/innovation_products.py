@@ -113,93 +113,128 @@ def products_by_part(
     What is stored besides the steps are a few samples' innovations, however long the runs are. Samples are read where
     they lie, for copies of very many columns would take longer than to filter them.
     """
-    runs, samples, q = steps.noise.shape[0], steps.noise.shape[1], steps.shown.shape[-1]
-    pieces, length = _cut(samples, parts)
+    return _filtered(steps, begin, parts)[:2]
+
+
+def _filtered(
+    steps: Steps, begin: Float[Array, "z z"], parts: int
+) -> tuple[Float[Array, "r m q q"], Float[Array, "r m"], tuple[Float[Array, "r m b z z"], Float[Array, "r m b z q"]]]:
+    """`products_by_part`, and covariance and means where each of the b pieces of a part begins."""
+    q = steps.shown.shape[-1]
+    pieces, length = _cut(steps.noise.shape[1], parts)
 
     def met(run: Array, carry: tuple[Array, Array], k: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        at = jax.tree.map(lambda M: M[run, jnp.minimum(k, M.shape[1] - 1)], steps)
-        # nothing is seen beyond the end, with unit noise, and adds nothing
-        seen = lambda M, otherwise: jnp.where(k < samples, M, otherwise)
-        at = at._replace(C=seen(at.C, 0.0), noise=seen(at.noise, 1.0), shown=seen(at.shown, 0.0))
-        carry, passed = _met(carry, at)
+        carry, passed = _met(carry, _sample(steps, run, k))
         return carry, (passed.white, jnp.sum(jnp.log(jnp.diagonal(passed.factor))))
 
-    def of_run(run: Array) -> tuple[Array, Array]:
-        def piece(carry: tuple, first: Array) -> tuple[tuple, Array]:
-            state, gram = carry
-            state, (white, logarithm) = jax.lax.scan(functools.partial(met, run), state, first + jnp.arange(length))
+    def of_run(run: Array) -> tuple[Array, Array, tuple[Array, Array]]:
+        def piece(carry: tuple, first: Array) -> tuple[tuple, tuple]:
+            before, gram = carry
+            after, (white, logarithm) = jax.lax.scan(functools.partial(met, run), before, first + jnp.arange(length))
             flat = white.reshape(-1, q)
-            return (state, gram + flat.T @ flat), jnp.sum(logarithm)
+            return (after, gram + flat.T @ flat), (jnp.sum(logarithm), before)
 
-        def part(state: tuple[Array, Array], firsts: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-            (state, gram), logarithm = jax.lax.scan(piece, (state, jnp.zeros((q, q), nothing.dtype)), firsts)
-            return state, (gram, jnp.sum(logarithm))
+        def part(state: tuple[Array, Array], firsts: Array) -> tuple[tuple[Array, Array], tuple]:
+            (state, gram), (logarithm, begun) = jax.lax.scan(piece, (state, jnp.zeros((q, q), nothing.dtype)), firsts)
+            return state, (gram, jnp.sum(logarithm), begun)
 
         return jax.lax.scan(part, (begin, nothing), length * jnp.arange(parts * pieces).reshape(parts, pieces))[1]
 
     nothing = jnp.zeros((len(begin), q), steps.shown.dtype)
     # one run after the other: products of three dimensions are slower than three of two
-    return jax.lax.map(of_run, jnp.arange(runs))
+    return jax.lax.map(of_run, jnp.arange(len(steps.noise)))
+
+
+def _sample(steps: Steps, run: Array, k: Array) -> Steps:
+    """What a filter needs at sample `k` of a run: beyond the end nothing, with unit noise, that leads nowhere."""
+    at = jax.tree.map(lambda M: M[run, jnp.minimum(k, M.shape[1] - 1)], steps)
+    seen = lambda M, otherwise: jnp.where(k < steps.noise.shape[1], M, otherwise)
+    return at._replace(F=seen(at.F, 0.0), C=seen(at.C, 0.0), noise=seen(at.noise, 1.0), shown=seen(at.shown, 0.0))
 
 
 @jax.custom_vjp
 def innovation_products(steps: Steps, begin: Float[Array, "z z"]) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
     """Products of the whitened innovations of all columns, and half the log-determinant of their covariance."""
-    return _products(*passes(steps, begin, lambda passed: (passed.white, passed.factor)))
+    return _forth(steps, begin)[0]
 
 
-def _products(white: Array, factor: Array) -> tuple[Array, Array]:
-    logarithm = jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1))
-    return jnp.einsum("rkca,rkcb->ab", white, white), jnp.sum(logarithm)
+def _forth(steps: Steps, begin: Array) -> tuple[tuple[Array, Array], tuple[Steps, tuple[Array, Array]]]:
+    gram, spread, begun = _filtered(steps, begin, 1)
+    first = jax.tree.map(lambda M: M[:, 0], begun)
+    return (jnp.sum(gram, (0, 1)), jnp.sum(spread)), (steps, first)
 
 
-def _forth(steps: Steps, begin: Array) -> tuple[tuple[Array, Array], tuple[Steps, Passed]]:
-    passed = passes(steps, begin, lambda passed: passed)
-    return _products(passed.white, passed.factor), (steps, passed)
-
-
-def _back(kept: tuple[Steps, Passed], given: tuple[Array, Array]) -> tuple[Steps, Array]:
-    steps, passed = kept
+def _back(kept: tuple[Steps, tuple[Array, Array]], given: tuple[Array, Array]) -> tuple[Steps, Array]:
+    """The adjoint, piece by piece from the last: what a piece met is worked out again from where it begins."""
+    steps, begun = kept
     both, spread = given[0] + given[0].T, given[1]
-    c, q = passed.white.shape[-2:]
-    one = jnp.broadcast_to(jnp.eye(c), passed.factor.shape)
-    inverse_factor = solve_triangular(passed.factor, one, lower=True)
-    solved = jnp.swapaxes(inverse_factor, -1, -2) @ jnp.concatenate(
-        [passed.white, passed.half, inverse_factor], axis=-1
-    )
-    u, gain, inverse = solved[..., :q], solved[..., q:-c], solved[..., -c:]
+    runs, samples, (z, q) = *steps.noise.shape[:2], begun[1].shape[-2:]
+    pieces, length = _cut(samples, 1)
 
-    def step(carry: tuple[Array, Array], sample: tuple) -> tuple[tuple[Array, Array], Steps]:
-        lever, weight = carry
-        at, passed, u, gain, inverse = sample
-        s = at.C.shape[1]
-        filtered = passed.X + passed.half.T @ passed.white, passed.P - passed.half.T @ passed.half
-        left, weighed = at.F.T @ lever, at.F.T @ weight
-        of_F = lever @ filtered[0].T + 2.0 * weight @ at.F @ filtered[1]
-        of_B, of_forcing = 2.0 * weight @ at.B, None if steps.forcing is None else -lever[:s]
-        weight = weighed @ at.F
-        told, kept = gain @ left, gain @ weight
-        pull = u @ both
-        of_E = told + pull
-        mixed = (told + 0.5 * pull) @ u.T
-        of_S = kept @ gain.T - 0.5 * (mixed + mixed.T) + 0.5 * spread * inverse
-        of_across = (u @ left.T - 2.0 * kept).at[:, :s].add(of_S @ at.C)
-        across = passed.factor @ passed.half
-        of_C = of_across @ passed.P[:s].T + of_S @ across[:, :s] - of_E @ passed.X[:s].T
-        share = at.C.T @ of_across
-        weight = weight.at[:s].add(0.5 * share).at[:, :s].add(0.5 * share.T)
-        lever = left.at[:s].add(-at.C.T @ of_E)
-        return (lever, weight), Steps(of_F, of_B, of_C, jnp.diagonal(of_S), of_E, of_forcing)
+    def of_run(each: tuple[Array, tuple[Array, Array]]) -> tuple[Steps, Array]:
+        run, begun = each
 
-    def run(*samples) -> tuple[Array, Steps]:
-        z = steps.F.shape[-1]
-        nothing = jnp.zeros((z, q), u.dtype), jnp.zeros((z, z), u.dtype)
-        (_, begun), found = jax.lax.scan(step, nothing, samples, reverse=True)
-        return begun, found
+        def piece(after: tuple[Array, Array], each: tuple[Array, tuple]) -> tuple[tuple[Array, Array], Steps]:
+            first, before = each
+            at = jax.vmap(lambda k: _sample(steps, run, k))(first + jnp.arange(length))
+            passed = jax.lax.scan(_met, before, at)[1]
+            return jax.lax.scan(
+                lambda carry, each: _back_step(carry, *each, both, spread),
+                after,
+                (at, passed, *_solved(passed)),
+                reverse=True,
+            )
 
-    begun, found = jax.vmap(run)(steps._replace(forcing=None), passed, u, gain, inverse)
+        nothing = jnp.zeros((z, q), begun[1].dtype), jnp.zeros((z, z), begun[1].dtype)
+        firsts = length * jnp.arange(pieces)
+        (_, weight), found = jax.lax.scan(piece, nothing, (firsts, begun), reverse=True)
+        return jax.tree.map(lambda M: M.reshape(-1, *M.shape[2:])[:samples], found), weight
+
+    found, weights = jax.lax.map(of_run, (jnp.arange(runs), begun))
     forcing = None if found.forcing is None else found.forcing[:, :-1]
-    return found._replace(forcing=forcing), jnp.sum(begun, axis=0)
+    return found._replace(forcing=forcing), jnp.sum(weights, axis=0)
+
+
+def _solved(passed: Passed) -> tuple[Array, Array, Array]:
+    """u, the gain's transpose and the inverse of the innovations' covariance, at all samples."""
+    c, q = passed.white.shape[-2:]
+    one = jnp.broadcast_to(jnp.eye(c, dtype=passed.factor.dtype), passed.factor.shape)
+    inverse_factor = solve_triangular(passed.factor, one, lower=True)
+    every = jnp.concatenate([passed.white, passed.half, inverse_factor], axis=-1)
+    solved = jnp.swapaxes(inverse_factor, -1, -2) @ every
+    return solved[..., :q], solved[..., q:-c], solved[..., -c:]
+
+
+def _back_step(
+    carry: tuple[Array, Array],
+    at: Steps,
+    passed: Passed,
+    u: Array,
+    gain: Array,
+    inverse: Array,
+    both: Array,
+    spread: Array,
+) -> tuple[tuple[Array, Array], Steps]:
+    """The adjoints before a sample by those after it, and the derivatives by what the filter needs there."""
+    lever, weight = carry
+    s = at.C.shape[1]
+    filtered = passed.X + passed.half.T @ passed.white, passed.P - passed.half.T @ passed.half
+    left, weighed = at.F.T @ lever, at.F.T @ weight
+    of_F = lever @ filtered[0].T + 2.0 * weight @ at.F @ filtered[1]
+    of_B, of_forcing = 2.0 * weight @ at.B, None if at.forcing is None else -lever[:s]
+    weight = weighed @ at.F
+    told, kept = gain @ left, gain @ weight
+    pull = u @ both
+    of_E = told + pull
+    mixed = (told + 0.5 * pull) @ u.T
+    of_S = kept @ gain.T - 0.5 * (mixed + mixed.T) + 0.5 * spread * inverse
+    of_across = (u @ left.T - 2.0 * kept).at[:, :s].add(of_S @ at.C)
+    across = passed.factor @ passed.half
+    of_C = of_across @ passed.P[:s].T + of_S @ across[:, :s] - of_E @ passed.X[:s].T
+    share = at.C.T @ of_across
+    weight = weight.at[:s].add(0.5 * share).at[:, :s].add(0.5 * share.T)
+    lever = left.at[:s].add(-at.C.T @ of_E)
+    return (lever, weight), Steps(of_F, of_B, of_C, jnp.diagonal(of_S), of_E, of_forcing)
 
 
 innovation_products.defvjp(_forth, _back)

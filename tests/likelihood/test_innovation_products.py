@@ -10,16 +10,14 @@ from jaxsub.likelihood.innovation_products import Steps, innovation_products, pa
 R, K, Z, N, C, S, Q = 2, 6, 5, 2, 3, 3, 4
 
 
-def some_steps(forced: bool) -> tuple[Steps, jax.Array]:
+def some_steps(forced: bool, samples: int = K) -> tuple[Steps, jax.Array]:
     """A small system of two runs, changing from sample to sample, and the covariance that it begins with."""
     rng = np.random.default_rng(11)
     draw = lambda *shape: jnp.asarray(rng.normal(size=shape))
     root = draw(Z, Z)
-    forcing = draw(R, K - 1, S, Q) if forced else None
-    noise = 1.0 + draw(R, K, C) ** 2
-    steps = Steps(
-        0.5 * draw(R, K, Z, Z), draw(R, K, Z, N), draw(R, K, C, S), noise, draw(R, K, C, Q), forcing
-    )  # fmt: skip
+    forcing = draw(R, samples - 1, S, Q) if forced else None
+    F, B, output = 0.5 * draw(R, samples, Z, Z), draw(R, samples, Z, N), draw(R, samples, C, S)
+    steps = Steps(F, B, output, 1.0 + draw(R, samples, C) ** 2, draw(R, samples, C, Q), forcing)
     return steps, root @ root.T
 
 
@@ -69,10 +67,11 @@ def test_products_are_those_of_the_dense_gaussian():
     assert float(found[1]) == pytest.approx(spread, rel=1e-12)
 
 
+@pytest.mark.parametrize("samples", [K, 150])
 @pytest.mark.parametrize("forced", [True, False])
-def test_the_adjoint_is_reverse_differentiation(forced):
-    """Claim: the derivative by every part of the system is that which JAX finds through the filter itself."""
-    given = some_steps(forced)
+def test_the_adjoint_is_reverse_differentiation(forced, samples):
+    """Claim: the derivative by every part of the system, in one piece or more, is JAX's through the filter itself."""
+    given = some_steps(forced, samples)
     ours = jax.grad(weighed)(given, innovation_products)
     steps, begin = jax.grad(weighed)(given, plainly)
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves((steps, symmetric(begin))), strict=True):
@@ -91,3 +90,17 @@ def test_the_adjoint_agrees_with_differences():
         difference = (weighed(up, innovation_products) - weighed(down, innovation_products)) / 2e-6
         slope = sum(jnp.sum(a * b) for a, b in zip(jax.tree.leaves(slopes), jax.tree.leaves(way), strict=True))
         assert float(slope) == pytest.approx(float(difference), rel=1e-6)
+
+
+def test_memory_of_the_adjoint_is_that_of_the_steps():
+    """Claim: from 256 to 1024 samples its memory, results apart, grows by less than what it was given."""
+
+    def memory(samples: int) -> tuple[int, int]:
+        given = some_steps(False, samples)
+        compiled = jax.jit(jax.grad(lambda given: weighed(given, innovation_products))).lower(given).compile()
+        used = compiled.memory_analysis()
+        assert used is not None
+        return used.temp_size_in_bytes, sum(leaf.nbytes for leaf in jax.tree.leaves(given))
+
+    (few, given), (many, more) = memory(256), memory(1024)
+    assert many - few < more - given
