@@ -1,10 +1,10 @@
-"""Gauss–Newton over runs that are too long for the memory: every expansion is summed over blocks of samples."""
+"""Gauss–Newton by expansions that are summed over blocks of samples, since long runs are too long for the memory."""
 
 import math
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..likelihood import block_length
@@ -14,14 +14,17 @@ from .method import Found, Iterative, Passes, from_start
 from .pool import ending
 from .problem import Problem
 
+# samples of all runs together up to which the pool's own program, a third faster, gains less than it takes to make
+_FEW = 2_000
 # passes that a search takes as a rule, and by how much each brings it nearer at least, before it has shown itself
 _USUAL, _SLOWEST = 6, 0.7
 
 
 class GaussNewton(Iterative):
-    """Damped Gauss–Newton; one search over runs of many blocks goes block by block, and tells how far it is.
+    """Damped Gauss–Newton; one search over long or short runs goes block by block, and tells how far it is.
 
-    Many searches, or runs of one block, go through a pool as those of any method.
+    It takes the program that a fit's statistics need anyway. Many searches, those over runs between, and those of a
+    compiled loop go through a pool as those of any method.
     """
 
     solver: Damped
@@ -34,34 +37,47 @@ class GaussNewton(Iterative):
         passes: Passes | None = None,
     ) -> Found:
         """As `Iterative.run`. `passes` is told of passes over all samples: how many are done and how many expected."""
-        runs = problem.runs
-        if len(starts) > 1 or outputs is not None or block_length(problem.vehicle, runs) >= runs.times.shape[1] - 1:
+        if len(starts) > 1 or outputs is not None or problem.march is not None or _suit_pool(problem):
             return super().run(problem, starts, outputs)
-        y, state, tell = starts[0], None, passes or (lambda done, expected: None)
+        y = trial = starts[0]
+        state, tell = None, passes or (lambda done, expected: None)
         decrements: list[float] = []
         while True:
             taken = len(decrements)
             expected = taken + _passes_left(decrements, self.solver.tolerance)
             share = lambda part, taken=taken, expected=expected: tell(taken + part, expected)
-            gram = problem.products_in_blocks(y if state is None else state.trial, share)
+            gram = problem.products_in_blocks(trial, share)
+            if state is None:
+                state = self.solver.begin(y, eqx.filter_eval_shape(problem.expansion, y, gram))
             y, state, done, result = _step(self.solver, problem, y, state, gram)
+            trial = state.trial
             decrements.append(float(state.decrement))
             if bool(done) or len(decrements) >= self.max_steps:
                 break
-        steps = jnp.asarray(len(decrements))
-        return jax.tree.map(lambda leaf: leaf[None], Found(y, state.at.cost, steps, from_start(result, steps)))
+        return _ended(y, state.at.cost, jax.device_put(np.asarray(len(decrements))), result)
+
+
+def _suit_pool(problem: Problem) -> bool:
+    """Whether the runs are one block, and long enough for a program of their own."""
+    samples = problem.runs.times.shape[1]
+    return problem.runs.times.size > _FEW and block_length(problem.vehicle, problem.runs) >= samples - 1
 
 
 @eqx.filter_jit
 def _step(
-    solver: Damped, problem: Problem, y: Array, state: State | None, gram: Float[Array, "r q q"]
+    solver: Damped, problem: Problem, y: Array, state: State, gram: Float[Array, "r q q"]
 ) -> tuple[Array, State, Bool[Array, ""], RESULTS]:
     """A step of `solver` by the products at the trial, and whether and how the search ends there."""
-    new = problem.expansion(y if state is None else state.trial, gram)
-    y, state = solver.follow(y, problem, solver.begin(y, new) if state is None else state, new)
+    y, state = solver.follow(y, problem, state, problem.expansion(state.trial, gram))
     done, result = solver.terminate(None, y, problem, {}, state, frozenset())
     result, done = ending(y, done, RESULTS.promote(result))
     return y, state, done, result
+
+
+@eqx.filter_jit
+def _ended(y: Array, cost: Array, steps: Array, result: RESULTS) -> Found:
+    """One search, as the only one of several."""
+    return jax.tree.map(lambda leaf: leaf[None], Found(y, cost, steps, from_start(result, steps)))
 
 
 def _passes_left(decrements: list[float], tolerance: float) -> int:

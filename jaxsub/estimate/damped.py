@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
@@ -64,9 +65,11 @@ class Damped(optx.AbstractMinimiser):
 
     def begin(self, y: Array, like: Expansion) -> State:
         """As `init`, where expansions have the shapes of `like`."""
-        zero = jnp.zeros((), y.dtype)
-        at = jax.tree.map(lambda part: jnp.zeros(part.shape, part.dtype), like)
-        return State(jnp.asarray(True), at, y, zero + 1.0, zero + _FIRST, zero + 2.0, zero + jnp.inf)
+        # by NumPy, for which no program has to be made
+        at = jax.tree.map(lambda part: np.zeros(part.shape, part.dtype), like)
+        numbers = [np.asarray(number, y.dtype) for number in (1.0, _FIRST, 2.0, np.inf)]
+        fresh, at, *rest = jax.device_put((np.asarray(True), at, *numbers))
+        return State(fresh, at, y, *rest)
 
     def step(self, fn: Any, y: Array, args: Any, options: Any, state: State, tags: Any) -> tuple[Array, State, None]:
         """Evaluate the trial, move there if it is better, and choose the next."""
@@ -80,6 +83,9 @@ class Damped(optx.AbstractMinimiser):
         good = finite & (state.fresh | ((gain > 0.0) & (state.promised > 0.0)))
         chosen = lambda a, b: jnp.where(good, a, b)
         at = jax.tree.map(chosen, new, state.at)
+        # of a start that does not run nothing else is known
+        cost = jnp.where(state.fresh, new.cost, at.cost)
+        at = eqx.tree_at(lambda expansion: expansion.cost, at, cost)
         shrink = jnp.maximum(1.0 / 3.0, 1.0 - (2.0 * jnp.minimum(gain, 1.0) - 1.0) ** 3)
         factor = jnp.where(state.fresh, 1.0, chosen(shrink, state.growth))
         damping = jnp.maximum(_LEAST, state.damping * factor)

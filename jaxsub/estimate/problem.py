@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..arrays import quietly
 from ..errors import InputError
 from ..likelihood import Watch, errors, nobody, summed_products
 from ..likelihood.march import March
@@ -190,13 +191,16 @@ class Problem(eqx.Module):
         every = jnp.concatenate([columns, error[..., None]], axis=-1)
         return jnp.einsum("rkca,rkcb->rab", every, every)
 
+    @quietly
     def products_in_blocks(self, y: Float[Array, " d"], watch: Watch = nobody) -> Float[Array, "r q q"]:
         """`products`, summed over blocks of samples. Not to be called in `jit`."""
         vehicle, start, scale = _split(self, y)
-        gram = summed_products(vehicle, self.runs, start, self.sigma, self.spread, watch)
+        # by NumPy, for which no program has to be made
+        scale = np.asarray(scale)
+        gram = np.asarray(summed_products(vehicle, self.runs, start, self.sigma, self.spread, watch))
         p, q = len(self.prior_mean), len(scale)
         kept = np.array([*range(p), q - 1]) if self.known_start else np.arange(q)
-        return (scale[:, None] * gram * scale)[:, kept[:, None], kept]
+        return jax.device_put((scale[:, None] * gram * scale)[:, kept[:, None], kept])
 
     @eqx.filter_jit
     def expand_exactly(self, y: Float[Array, " d"]) -> "Expansion":

@@ -17,7 +17,7 @@ from jaxsub.simulate import synthetic
 from jaxsub.vehicle import write_vehicle
 
 ROOT = Path(__file__).parents[2]
-MOST = 30
+MOST = 25
 UNNEEDED = {"diffrax", "h5py", "matplotlib", "optax", "pandas", "scipy.optimize", "scipy.stats", "xarray"}
 PROGRAM = """
 import json, sys
