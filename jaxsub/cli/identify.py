@@ -41,7 +41,7 @@ def run(
     The fit is put at `out` as soon as it is there, and stays there whatever ends what follows; the verdict is shown
     before the rest is written.
     """
-    session.start()
+    session.start(recordings=runs)
     return_memory()
     with fresh_folders(out, overwrite, paths_of(vehicle_path, *runs, columns)) as fresh:
         vehicle = read_vehicle(vehicle_path)

@@ -1,10 +1,11 @@
 """What every command sets up: double precision and the compilation cache."""
 
 import glob
+import math
 import os
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +16,20 @@ from . import terminal
 
 # up to a third less time, for programs that run as fast; on jax 0.10 half, for programs up to a quarter slower
 _QUICKLY, _QUICKER = "--xla_backend_optimization_level=1", "--xla_cpu_use_fusion_emitters=false"
+# bytes of recordings up to which nothing is optimised: another third less time, 5 s of `identify`, for programs that
+# take twice as long, 3 s more a million bytes
+_AS_QUICKLY_AS_CAN_BE, _SMALL = "--xla_backend_optimization_level=0", 200_000
 _CACHE_FAILS = r"Error (reading|writing) persistent compilation cache entry for '([^']*)'"
 
 
-def start(long: bool = False) -> None:
+def start(long: bool = False, recordings: Sequence[Path] = ()) -> None:
     """Double precision, and compiled programs kept in the user's cache folder.
 
-    Unless what follows is `long`, it is compiled quickly rather than well.
+    Unless what follows is `long`, it is compiled quickly rather than well; where it makes one pass after another over
+    `recordings` that are small files, as quickly as can be.
     """
     if not long:
-        _compile_quickly()
+        _compile_quickly(_AS_QUICKLY_AS_CAN_BE if recordings and _size(recordings) <= _SMALL else _QUICKLY)
     jax.config.update("jax_enable_x64", True)
     _keep_programs()
 
@@ -90,12 +95,17 @@ def _repair(folder: Path) -> None:
     warnings.showwarning = _Repair(folder, show.show if isinstance(show, _Repair) else show)
 
 
-def _compile_quickly() -> None:
-    """Options of XLA, which reads them when it first compiles, and ends the process at one that it does not know.
+def _size(paths: Sequence[Path]) -> float:
+    """Bytes of the files at `paths`, infinite where one is none."""
+    return sum((path.stat().st_size if path.is_file() else math.inf for path in paths), 0.0)
 
-    What the caller set is left as it is.
+
+def _compile_quickly(level: str) -> None:
+    """Options of XLA, `level` among them; what the caller set is left as it is.
+
+    XLA reads them when it first compiles, and ends the process at one that it does not know.
     """
     given = os.environ.get("XLA_FLAGS", "").split()
-    known = [_QUICKLY, *([_QUICKER] if jax.__version_info__[:2] == (0, 10) else [])]
+    known = [level, *([_QUICKER] if jax.__version_info__[:2] == (0, 10) else [])]
     fresh = [flag for flag in known if not any(one.startswith(flag.split("=")[0]) for one in given)]
     os.environ["XLA_FLAGS"] = " ".join([*given, *fresh])

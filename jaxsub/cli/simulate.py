@@ -38,7 +38,7 @@ def run(
     The model starts at rest, from the recorded first samples, or from the initial state that the whole recording makes
     most probable, as `diagnose` and `identify` estimate it. Of a log, the file at `columns` says what to take.
     """
-    session.start()
+    session.start(recordings=[run_path])
     with fresh_file(out, overwrite, paths_of(vehicle_path, run_path, columns)) as path:
         vehicle = read_vehicle(vehicle_path)
         recording = checked_run(with_every_channel(load_run(run_path, vehicle, columns), vehicle), vehicle)

@@ -75,3 +75,31 @@ def test_set_up_twice_the_damage_is_said_once(tmp_path):
         entry.write_bytes(b"damaged")
     said = ran(starts=3, XDG_CACHE_HOME=str(tmp_path))
     assert said.count("\n") == 1 and "damaged entries are replaced" in said
+
+
+LEVEL = """
+import os, sys
+from pathlib import Path
+from jaxsub.cli import session
+session.start(recordings=[Path(name) for name in sys.argv[1:]])
+print(os.environ["XLA_FLAGS"])
+"""
+
+
+@pytest.mark.parametrize(
+    ("sizes", "given", "level"),
+    [([1000, 1000], "", 0), ([1000, 300_000], "", 1), ([1000], "--xla_backend_optimization_level=3", 3), ([], "", 1)],
+)
+def test_programs_for_small_recordings_are_not_optimised(tmp_path, sizes, given, level):
+    """Claim: XLA is told level 0 for small files, 1 for larger ones and what is none, and what the caller set stays."""
+    paths = [tmp_path / f"{index}.csv" for index in range(len(sizes))]
+    for path, size in zip(paths, sizes, strict=True):
+        path.write_bytes(b"x" * size)
+    done = subprocess.run(
+        [sys.executable, "-c", LEVEL, *map(str, paths)],
+        env=os.environ | {"PYTHONPATH": str(ROOT), "XLA_FLAGS": given, "XDG_CACHE_HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert f"--xla_backend_optimization_level={level}" in done.stdout.split(), done.stderr
