@@ -8,7 +8,8 @@ from ..vehicle import Layout
 
 Role = Literal["held input", "prescribed", "measured"]
 _INPUT_UNITS = {"thrust": "N", "shaft_speed": "rad/s"}
-_ENVIRONMENT_UNITS = {"density": "kg/m³", "temperature": "K", "altitude": "m", "ballast": "m³"}
+_ENVIRONMENT_UNITS = {"density": "kg/m³", "temperature": "K", "altitude": "m", "ballast": "m³", "current_north": "m/s",
+                      "current_east": "m/s"}  # fmt: skip
 # Euler angles, in which a whole turn makes no difference
 ANGLES = ("phi", "theta", "psi")
 

@@ -20,7 +20,7 @@ from ..plain import to_json
 from ..recording import Recording, hold_out, save
 from ..report import write_report
 from ..report.text import measurement, percent, ratio, unit
-from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text
+from ..vehicle import AbstractVehicle, added_effects, read_vehicle, vehicle_text, with_coefficients
 from . import session, terminal
 from .options import options
 from .output import Fresh, fresh_folders, paths_of
@@ -54,7 +54,7 @@ def run(
         own = () if script is None else from_script(script)
         vehicle = read_vehicle(vehicle_path, own)
         require_free(vehicle, str(vehicle_path))
-        first = () if begin is None else _added(vehicle, begin, own)
+        first = () if begin is None else _added(vehicle, begin, (*vocabulary(), *own))
         recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
         train, test = (recordings, unseen) if held else hold_out(recordings)
         keep = lambda diagnosis, improved: _keep(Answer(diagnosis, improved, None), fresh, out)
@@ -69,10 +69,10 @@ def run(
         raise KeyboardInterrupt
 
 
-def _added(vehicle: AbstractVehicle, improved: Path, own: tuple[type[AbstractEffect], ...]) -> list[AbstractEffect]:
-    """The effects that the vehicle file `improved` has more than a vehicle."""
-    there = {effect.label for effect in vehicle.effects}
-    found = [effect for effect in read_vehicle(improved, own).effects if effect.label not in there]
+def _added(vehicle: AbstractVehicle, improved: Path, kinds: tuple[type[AbstractEffect], ...]) -> list[AbstractEffect]:
+    """The effects of `kinds` that the vehicle file `improved` has more than a vehicle."""
+    own = [kind for kind in kinds if kind not in vocabulary()]
+    found = added_effects(read_vehicle(improved, own), vehicle, kinds)
     if not found:
         raise InputError(str(improved), "has no effect that the vehicle lacks", "leave out --begin")
     return found
@@ -112,7 +112,8 @@ class Answer:
     def write_numbers(self, folder: Path) -> str:
         """Write `diagnosis.json` and `improved.toml` alone; returns the latter's text."""
         diagnosis = self.diagnosis
-        text = vehicle_text(self.improved, f"{diagnosis.vehicle}, improved by jaxsub\n{diagnosis.summary}")
+        improved = with_coefficients(self.improved)
+        text = vehicle_text(improved, f"{diagnosis.vehicle}, improved by jaxsub\n{diagnosis.summary}")
         (folder / "improved.toml").write_text(text, encoding="utf-8")
         (folder / "diagnosis.json").write_text(to_json(diagnosis.to_json()), encoding="utf-8")
         return text

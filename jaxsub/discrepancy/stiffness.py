@@ -1,14 +1,15 @@
 r"""Integration steps short enough for the forces of effects: what decays within a part of a step is not followed.
 
-Linear damping is exact at any step. What effects add is stepped explicitly, and from $|\lambda|h \approx 2.8$ on a
-fourth-order Runge–Kutta step grows where the motion decays. Source: Hairer and Wanner (1996), Solving Ordinary
-Differential Equations II, ch. IV.2.
+Linear damping is exact at any step. What effects and the vehicle's products of velocities add is stepped explicitly,
+and from $|\lambda|h \approx 2.8$ on a fourth-order Runge–Kutta step grows where the motion decays. Source: Hairer and
+Wanner (1996), Solving Ordinary Differential Equations II, ch. IV.2.
 
 States of effects may turn so sharply that a step which does not grow is still too long: half as long ones then show by
 how much.
 """
 
 import dataclasses
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -123,6 +124,7 @@ def _with_states(vehicle: AbstractVehicle) -> bool:
     return any(isinstance(effect, AbstractMemory) for effect in vehicle.effects)
 
 
-def _at_once(vehicle: AbstractVehicle) -> list[AbstractForce]:
-    """The forces of effects without states."""
-    return [e for e in vehicle.effects if isinstance(e, AbstractForce) and not isinstance(e, AbstractMemory)]
+def _at_once(vehicle: AbstractVehicle) -> list[Any]:
+    """What is stepped explicitly: forces of effects without states, and of the vehicle's own products."""
+    effects = [e for e in vehicle.effects if isinstance(e, AbstractForce) and not isinstance(e, AbstractMemory)]
+    return [*effects, *vehicle.nonlinear]

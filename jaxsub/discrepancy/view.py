@@ -251,6 +251,7 @@ def facts(view: View) -> Facts:
         depth_range=(float(depth.min()), float(depth.max())),
         tones=dict(zip(layout.equations, shaking, strict=False)),
         frequencies=frequencies,
+        has=view.vehicle.has,
     )
 
 

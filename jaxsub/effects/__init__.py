@@ -5,6 +5,7 @@ from .actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRat
 from .base import (
     AbstractActuator,
     AbstractCurve,
+    AbstractDerivative,
     AbstractEffect,
     AbstractForce,
     AbstractInstrument,
@@ -21,9 +22,10 @@ from .base import (
     with_numbers,
 )
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
-from .environment import Current, WaveForcing, wave_band
+from .derivative import INPUT_SYMBOLS, Derivative, Power, alike, derivative
+from .environment import Current, WaveForcing, stream, wave_band
 from .events import MassShift, ThrustLoss
-from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss
+from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss, coriolis
 from .hull_damping import CubicDamping, QuadraticDamping
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
 from .mechanisms import AsymmetricDamping, CoulombFriction, CubicStiffness, Saturation
@@ -47,7 +49,7 @@ from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
 from .sensors import SensorBias, SensorDrift, SensorScale
 from .smooth import KNOTS, SmoothForce, variables
-from .vocabulary import VOCABULARY, candidates, from_script, looked_at, vocabulary
+from .vocabulary import VOCABULARY, candidates, from_script, looked_at, named, vocabulary
 
 __all__ = [
     "CHANNEL_UNITS",
@@ -55,11 +57,13 @@ __all__ = [
     "FORCES",
     "FORCE_UNITS",
     "GRAVITY",
+    "INPUT_SYMBOLS",
     "KNOTS",
     "VELOCITIES",
     "VOCABULARY",
     "AbstractActuator",
     "AbstractCurve",
+    "AbstractDerivative",
     "AbstractEffect",
     "AbstractForce",
     "AbstractInstrument",
@@ -83,6 +87,7 @@ __all__ = [
     "CubicStiffness",
     "Current",
     "DensityStratification",
+    "Derivative",
     "Facts",
     "FluidMemory",
     "FreeSurfaceSuction",
@@ -91,6 +96,7 @@ __all__ = [
     "Hysteresis",
     "MassShift",
     "Motion",
+    "Power",
     "PropellerAsymmetry",
     "PropellerRace",
     "PropellerTorque",
@@ -115,18 +121,23 @@ __all__ = [
     "TurningSpeedLoss",
     "WaveForcing",
     "admissible",
+    "alike",
     "amplitude",
     "amplitudes",
     "by_name",
     "candidates",
+    "coriolis",
+    "derivative",
     "from_script",
     "looked_at",
+    "named",
     "number_fields",
     "numbers",
     "options",
     "parameter_table",
     "shape",
     "stacked",
+    "stream",
     "unit_per",
     "variables",
     "velocities",

@@ -13,7 +13,8 @@ from jaxtyping import Array, ArrayLike, Float
 
 from ..errors import InputError
 from ..parameters import Parameter, number
-from .motion import Facts, Motion, Signal
+from .derivative import Derivative
+from .motion import EQUATIONS, Facts, Motion, Signal
 
 
 def amplitude(unit: str, sign: int = 0, default: float = 0.0, most: float = math.inf) -> Any:
@@ -101,6 +102,49 @@ class AbstractForce(AbstractEffect):
     @abc.abstractmethod
     def force(self, motion: Motion) -> dict[str, Signal]:
         """Generalised force (N or N m) by equation; leading axes follow those of `motion`."""
+
+    @property
+    def term(self) -> str:
+        """The name of what a vehicle's own equations may contain that makes this effect superfluous (`Facts.has`)."""
+        return ""
+
+
+class AbstractDerivative(AbstractForce):
+    r"""An effect that is one `Derivative` with one number: $\tau_i = c\,\prod_j x_j^{k_j}$."""
+
+    @property
+    @abc.abstractmethod
+    def derivative(self) -> Derivative:
+        """Equation and product."""
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The one equation."""
+        return (self.derivative.equation,)
+
+    @property
+    def expression(self) -> str:
+        """The number and the product."""
+        (symbol,) = self.symbols().values()
+        return f"{symbol} {self.derivative.expression}".rstrip()
+
+    @property
+    def term(self) -> str:
+        """The derivative's symbol, of a body's equation."""
+        return self.derivative.name if self.derivative.equation in EQUATIONS else ""
+
+    def units(self) -> dict[str, str]:
+        """Force per product."""
+        (field,) = amplitudes(self)
+        return {field: self.derivative.unit}
+
+    def force(self, motion: Motion) -> dict[str, Signal]:
+        """The force along the motion."""
+        (field,) = amplitudes(self)
+        e = self.derivative.equation
+        # a constant has the shape of the motion too
+        zero = 0.0 if self.derivative.powers else 0.0 * motion.rates[e]
+        return {e: getattr(self, field) * self.derivative.product(motion) + zero}
 
 
 class AbstractActuator(AbstractEffect):

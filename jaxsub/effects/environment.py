@@ -1,6 +1,6 @@
 """The water that moves: currents and waves."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import equinox as eqx
@@ -19,9 +19,10 @@ _LONGEST_PERIOD = 30.0
 class Current(AbstractForce):
     r"""A steady horizontal current $V_N, V_E$ (m/s, over ground, of either sign), where velocities are over ground.
 
-    In body axes $v_c = R(\phi,\theta,\psi)^T[V_N\,V_E\,0]$, and linear damping feels the water and not the ground:
-    $\tau = -A\,[v_c\,0]$ with the linear derivatives by u, v and w. What grows with the square of the velocity, and the
-    added mass of water that turns past the body, are left out. Source: Fossen (2021), §10.3.
+    In body axes $v_c = R(\phi,\theta,\psi)^T[V_N\,V_E\,0]$, and damping feels the water and not the ground:
+    $\tau = -A\,[v_c\,0]$ with the derivatives by u, v and w, linear about the operating speed. What grows with the
+    square of the velocity, and the added mass of water that turns past the body, are left out. A recorded current
+    (`[environment]`) has them. Source: Fossen (2021), §10.3.
     """
 
     name: ClassVar[str] = "current"
@@ -48,15 +49,20 @@ class Current(AbstractForce):
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """What the damping of the water's own velocity takes away."""
-        phi, theta, psi = (motion.positions[name] for name in ("phi", "theta", "psi"))
-        xp = namespace(psi, self.V_N)
-        ahead = self.V_N * xp.cos(psi) + self.V_E * xp.sin(psi)
-        across = self.V_E * xp.cos(psi) - self.V_N * xp.sin(psi)
-        u = ahead * xp.cos(theta)
-        v = ahead * xp.sin(theta) * xp.sin(phi) + across * xp.cos(phi)
-        w = ahead * xp.sin(theta) * xp.cos(phi) - across * xp.sin(phi)
+        u, v, w = stream(motion.positions, self.V_N, self.V_E)
         rows = {e: motion.damping[EQUATIONS.index(e)] for e in self.equations}
         return {e: -(row[0] * u + row[1] * v + row[2] * w) for e, row in rows.items()}
+
+
+def stream(positions: Mapping[str, Signal], north: Signal, east: Signal) -> tuple[Signal, Signal, Signal]:
+    """Velocity of water that flows `north` and `east` (m/s) in the axes of a body at the attitude `positions`."""
+    phi, theta, psi = (positions[name] for name in ("phi", "theta", "psi"))
+    xp = namespace(psi, north)
+    ahead = north * xp.cos(psi) + east * xp.sin(psi)
+    across = east * xp.cos(psi) - north * xp.sin(psi)
+    v = ahead * xp.sin(theta) * xp.sin(phi) + across * xp.cos(phi)
+    w = ahead * xp.sin(theta) * xp.cos(phi) - across * xp.sin(phi)
+    return ahead * xp.cos(theta), v, w
 
 
 def wave_band(duration: float, sample_interval: float) -> tuple[float, float]:

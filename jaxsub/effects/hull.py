@@ -5,10 +5,11 @@ from typing import ClassVar
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
-from ..arrays import namespace
-from .base import AbstractForce, amplitude
+from ..arrays import Values, namespace
+from .base import AbstractDerivative, AbstractForce, amplitude
+from .derivative import Derivative
 from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
 
 WATER_DENSITY = 1025.0
@@ -54,7 +55,7 @@ class CrossflowDrag(AbstractForce):
         across, turning, arm = ("sway", "yaw", 1.0) if self.plane == "horizontal" else ("heave", "pitch", -1.0)
         nodes, weights = np.polynomial.legendre.leggauss(16)
         x, dx = 0.5 * self.length * nodes, 0.5 * self.length * weights
-        local = motion.rates[across][..., None] + arm * x * motion.rates[turning][..., None]
+        local = motion.flow[across][..., None] + arm * x * motion.flow[turning][..., None]
         strips = -0.5 * WATER_DENSITY * self.diameter * self.C_d * abs(local) * local * dx
         total = namespace(strips).sum
         return {across: total(strips, -1), turning: total(arm * x * strips, -1)}
@@ -93,18 +94,31 @@ class CoriolisCoupling(AbstractForce):
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """Forces and moments of the momentum carried around."""
-        xp = namespace(*(motion.rates[e] for e in EQUATIONS), self.fraction)
-        rates = xp.stack(xp.broadcast_arrays(*(motion.rates[e] for e in EQUATIONS)), -1)
+        xp = namespace(*(motion.flow[e] for e in EQUATIONS), self.fraction)
+        rates = xp.stack(xp.broadcast_arrays(*(motion.flow[e] for e in EQUATIONS)), -1)
         deviation = rates - motion.cruise * xp.eye(6)[0]
-        momentum = deviation @ motion.inertia.T
-        linear, angular, p, h = deviation[..., :3], deviation[..., 3:], momentum[..., :3], momentum[..., 3:]
-        force = xp.cross(angular, p)
-        moment = xp.cross(angular, h) + xp.cross(linear, p)
-        total = -self.fraction * xp.concatenate([force, moment], -1)
+        total = self.fraction * coriolis(motion.inertia, deviation)
         return {e: total[..., i] for i, e in enumerate(EQUATIONS) if e in self.equations}
 
+    @property
+    def term(self) -> str:
+        """The full products of the vehicle file's `[model]`."""
+        return "coriolis"
 
-class TurningSpeedLoss(AbstractForce):
+
+def coriolis(inertia: Float[Values, "6 6"], velocity: Float[Values, "*k 6"]) -> Float[Values, "*k 6"]:
+    r"""$-C(\nu)\nu$: forces and moments (N, N m) of the momentum $[p; h] = M\nu$ that is carried around.
+
+    By Kirchhoff $C(\nu)\nu = [\nu_2\times p;\; \nu_2\times h + \nu_1\times p]$, for rigid body and added mass alike.
+    """
+    xp = namespace(inertia, velocity)
+    momentum = velocity @ inertia.T
+    linear, angular, p, h = velocity[..., :3], velocity[..., 3:], momentum[..., :3], momentum[..., 3:]
+    moment = xp.cross(angular, h) + xp.cross(linear, p)
+    return -xp.concatenate([xp.cross(angular, p), moment], -1)
+
+
+class TurningSpeedLoss(AbstractDerivative):
     r"""Surge resistance of manoeuvring: $X = X_{ab}\,a\,b$ for one pair of $v, r, w, q$ or a deflection.
 
     Squares must not propel ($X_{vv}, X_{rr}, X_{ww}, X_{qq}, X_{\delta\delta} \le 0$); $X_{vr}$ and $X_{wq}$,
@@ -128,33 +142,18 @@ class TurningSpeedLoss(AbstractForce):
         return [cls(*pair) for pair in free + [(fin, fin) for fin in facts.fins]]
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """Surge."""
-        return ("surge",)
+    def derivative(self) -> Derivative:
+        """The pair, in surge."""
+        return Derivative.by("surge", self.first, self.second)
 
     def symbols(self) -> dict[str, str]:
         """SNAME symbol such as `X_vr`, or `X_rudder_rudder`."""
         a, b = self.first, self.second
         return {"coefficient": f"X_{VELOCITIES[a]}{VELOCITIES[b]}" if a in VELOCITIES else f"X_{a}_{b}"}
 
-    def units(self) -> dict[str, str]:
-        """Force per product."""
-        return {"coefficient": unit_per("surge", self.first, self.second)}
-
     def signs(self) -> dict[str, int]:
         """A square does not propel."""
         return {"coefficient": -1 if self.first == self.second else 0}
-
-    @property
-    def expression(self) -> str:
-        """The product."""
-        a, b = (VELOCITIES.get(name, name) for name in (self.first, self.second))
-        return f"{self.symbols()['coefficient']} " + (f"{a}²" if a == b else f"{a} {b}")
-
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """The resistance along the motion."""
-        known = motion.rates | motion.actuators
-        return {"surge": self.coefficient * known[self.first] * known[self.second]}
 
 
 class SpeedScaling(AbstractForce):
@@ -207,17 +206,22 @@ class SpeedScaling(AbstractForce):
         return {"coefficient": unit_per(self.equation, "surge", self.with_)}
 
     @property
+    def term(self) -> str:
+        """The derivative by the product of speed and the other, such as `N_ur`."""
+        return Derivative.by(self.equation, "surge", self.with_).name
+
+    @property
     def expression(self) -> str:
         """The product."""
         return f"{self.symbols()['coefficient']} (u - U_c) {VELOCITIES.get(self.with_, self.with_)}"
 
     def force(self, motion: Motion) -> dict[str, Signal]:
         """The extra lift along the motion."""
-        known = motion.rates | motion.actuators
-        return {self.equation: self.coefficient * (motion.rates["surge"] - motion.cruise) * known[self.with_]}
+        known = motion.flow | motion.actuators
+        return {self.equation: self.coefficient * (motion.flow["surge"] - motion.cruise) * known[self.with_]}
 
 
-class HullAsymmetry(AbstractForce):
+class HullAsymmetry(AbstractDerivative):
     r"""A constant side force or moment of a hull that is not quite symmetric: $\tau_i = c$.
 
     Source: Fossen (2021), §9.4; model tests report it as $Y_*$, $N_*$ (Abkowitz 1964).
@@ -234,23 +238,10 @@ class HullAsymmetry(AbstractForce):
         return [cls(e) for e in facts.equations if e in EQUATIONS[1:]]
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """The one equation."""
-        return (self.equation,)
+    def derivative(self) -> Derivative:
+        """A constant."""
+        return Derivative(self.equation)
 
     def symbols(self) -> dict[str, str]:
         """SNAME symbol such as `Y_0`."""
         return {"constant": f"{FORCES[self.equation]}_0"}
-
-    def units(self) -> dict[str, str]:
-        """A force or a moment."""
-        return {"constant": unit_per(self.equation)}
-
-    @property
-    def expression(self) -> str:
-        """The constant."""
-        return self.symbols()["constant"]
-
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """The constant, along the motion."""
-        return {self.equation: self.constant + 0.0 * motion.rates[self.equation]}

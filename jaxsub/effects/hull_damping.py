@@ -6,11 +6,12 @@ from typing import ClassVar
 import equinox as eqx
 from jaxtyping import Array
 
-from .base import AbstractForce, amplitude
-from .motion import FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
+from .base import AbstractDerivative, amplitude
+from .derivative import Derivative, Power
+from .motion import FORCES, VELOCITIES, Facts
 
 
-class _PowerDamping(AbstractForce):
+class _PowerDamping(AbstractDerivative):
     """Drag on one equation that grows with a power of its own velocity."""
 
     equation: eqx.AbstractVar[str]
@@ -23,31 +24,15 @@ class _PowerDamping(AbstractForce):
         return [cls(equation) for equation in facts.equations]  # pyright: ignore[reportCallIssue]
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """The one equation."""
-        return (self.equation,)
-
-    @property
-    def expression(self) -> str:
-        """The drag term."""
-        velocity = VELOCITIES.get(self.equation, f"{self.equation}'")
-        growth = {2: f"|{velocity}| {velocity}", 3: f"{velocity}³"}[self.power]
-        return f"{self.symbols()['coefficient']} {growth}"
+    def derivative(self) -> Derivative:
+        """The equation's own velocity to the power, with its sign."""
+        return Derivative(self.equation, (Power(self.equation, self.power),))
 
     def symbols(self) -> dict[str, str]:
         """SNAME symbol such as `K_pp`, `K_ppp`; `D2_roll`, `D3_roll` for a mechanism's coordinate."""
         if self.equation in VELOCITIES:
             return {"coefficient": f"{FORCES[self.equation]}_{VELOCITIES[self.equation] * self.power}"}
         return {"coefficient": f"D{self.power}_{self.equation}"}
-
-    def units(self) -> dict[str, str]:
-        """Force per power of the velocity."""
-        return {"coefficient": unit_per(self.equation, *(self.equation,) * self.power)}
-
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """The drag along the motion."""
-        rate = motion.rates[self.equation]
-        return {self.equation: self.coefficient * abs(rate) ** (self.power - 1) * rate}
 
 
 class QuadraticDamping(_PowerDamping):

@@ -82,7 +82,7 @@ class FluidMemory(AbstractMemory):
     def memory_rates(self, motion: Motion) -> dict[str, Signal]:
         """First-order lag of the velocity."""
         steady = motion.cruise if self.equation == "surge" else 0.0
-        behind = motion.rates[self.equation] - steady - motion.positions[self.states[0]]
+        behind = motion.flow[self.equation] - steady - motion.positions[self.states[0]]
         return {self.states[0]: behind / jnp.maximum(self.T_m, 1e-6)}
 
 

@@ -27,7 +27,8 @@ def unit_per(equation: str, *variables: str) -> str:
     """The unit of a coefficient that makes a force of `equation` from a product of variables."""
     lines, angles = EQUATIONS[:3], EQUATIONS[3:]
     force = "N" if equation in lines else "N*m"
-    units = ["(m/s)" if v in lines else "(rad/s)" if v in angles else "rad" for v in variables]
+    known = dict.fromkeys(lines, "(m/s)") | dict.fromkeys((*angles, "shaft_speed"), "(rad/s)") | {"thrust": "N"}
+    units = [known.get(variable, "rad") for variable in variables]
     return "/".join([force, *units]) if equation in EQUATIONS else "1"
 
 
@@ -46,6 +47,7 @@ class Motion(eqx.Module):
     - `damping`: (n, n) linear damping of the equations in `rates`; times a velocity it is a force.
     - `time`: s from the run's own start.
     - `accelerations`: rates of the free equations' velocities, where an accelerometer asks for them.
+    - `water`: velocity of the water over ground in body axes (m/s), by the equation of the body's own; absent at rest.
     """
 
     rates: dict[str, Signal]
@@ -58,6 +60,12 @@ class Motion(eqx.Module):
     damping: Float[Signal, "n n"]
     time: Signal | float = 0.0
     accelerations: dict[str, Signal] = eqx.field(default_factory=dict)
+    water: dict[str, Signal] = eqx.field(default_factory=dict)
+
+    @property
+    def flow(self) -> dict[str, Signal]:
+        """Velocities through the water: forces of the water follow these."""
+        return self.rates | {equation: self.rates[equation] - moving for equation, moving in self.water.items()}
 
 
 def velocities(motion: Motion) -> dict[str, Signal]:
@@ -85,6 +93,7 @@ class Facts(eqx.Module):
     - `input_range`: rms, largest size and largest rate (per s) of each actuator's command.
     - `output_range`: least and largest of what was recorded of each channel.
     - `depth_range`: least and largest depth, m.
+    - `has`: what the vehicle's own equations contain of what an effect could say: names of `Derivative`s, `coriolis`.
     - `tones`: frequencies (rad/s) at which what each equation misses stands out, inside `wave_band`; `frequencies`: how
       many they were chosen among.
 
@@ -107,6 +116,7 @@ class Facts(eqx.Module):
     depth_range: tuple[float, float] = (0.0, 0.0)
     tones: dict[str, tuple[float, ...]] = eqx.field(default_factory=dict)
     frequencies: int = 0
+    has: frozenset[str] = frozenset()
 
     @property
     def largest_commands(self) -> dict[str, float]:

@@ -6,11 +6,12 @@ from typing import ClassVar
 import equinox as eqx
 from jaxtyping import Array
 
-from .base import AbstractForce, amplitude
-from .motion import FORCES, Facts, Motion, Signal, unit_per
+from .base import AbstractDerivative, amplitude
+from .derivative import Derivative, Power
+from .motion import FORCES, Facts
 
 
-class PropellerTorque(AbstractForce):
+class PropellerTorque(AbstractDerivative):
     r"""Roll reaction of the propeller: $K = K_{nn}|n|n$ with recorded shaft speed, else a constant $K_Q$.
 
     At constant rpm this cannot be told from a trim offset or an asymmetric hull. Source: Fossen (2021), §9.5.
@@ -30,49 +31,21 @@ class PropellerTorque(AbstractForce):
         return [cls(source[0] if source else "constant")]
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """Roll."""
-        return ("roll",)
-
-    @property
-    def expression(self) -> str:
-        """The torque."""
-        return {"shaft_speed": "K_Q |n| n", "thrust": "K_Q T", "constant": "K_Q"}[self.grows_with]
+    def derivative(self) -> Derivative:
+        """Roll by what it grows with."""
+        return Derivative("roll", () if self.grows_with == "constant" else (pushing(self.grows_with),))
 
     def symbols(self) -> dict[str, str]:
         """`K_Q`."""
         return {"torque": "K_Q"}
 
-    def units(self) -> dict[str, str]:
-        """A moment, per what it grows with."""
-        return {"torque": {"shaft_speed": "N*m/(rad/s)/(rad/s)", "thrust": "m", "constant": "N*m"}[self.grows_with]}
 
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """The reaction along the motion."""
-        if self.grows_with == "shaft_speed":
-            n = motion.actuators["shaft_speed"]
-            return {"roll": self.torque * abs(n) * n}
-        if self.grows_with == "thrust":
-            return {"roll": self.torque * motion.actuators["thrust"]}
-        return {"roll": self.torque + 0.0 * motion.rates["roll"]}
-
-
-def push(motion: Motion, by: str) -> Signal:
+def pushing(by: str) -> Power:
     """What the forces of a propeller grow with: the recorded thrust (N), or $|n|n$ of the shaft speed n (rad/s)."""
-    recorded = motion.actuators[by]
-    return recorded if by == "thrust" else abs(recorded) * recorded
+    return Power(by) if by == "thrust" else Power(by, 2, odd=True)
 
 
-def _unit(force: str, by: str) -> str:
-    """The unit of what multiplies `push` to give a force."""
-    return f"{force}/N" if by == "thrust" else f"{force}/(rad/s)/(rad/s)"
-
-
-def _written(by: str) -> str:
-    return "T" if by == "thrust" else "|n| n"
-
-
-class PropellerAsymmetry(AbstractForce):
+class PropellerAsymmetry(AbstractDerivative):
     r"""Side force or moment of a propeller off the axis or in an uneven wake: $\tau_i = c\,s$ of either sign.
 
     s is the recorded thrust T, or $|n|n$ of the recorded shaft speed n; where that does not change, no one can tell it
@@ -92,29 +65,16 @@ class PropellerAsymmetry(AbstractForce):
         return [cls(e, by) for e in across for by in facts.propulsion[:1]]
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """The one equation."""
-        return (self.equation,)
+    def derivative(self) -> Derivative:
+        """The equation by the push."""
+        return Derivative(self.equation, (pushing(self.by),))
 
     def symbols(self) -> dict[str, str]:
         """SNAME symbol such as `Y_nn` or `N_T`."""
         return {"c": f"{FORCES[self.equation]}_{'T' if self.by == 'thrust' else 'nn'}"}
 
-    def units(self) -> dict[str, str]:
-        """Force per thrust, or per square of the shaft speed."""
-        return {"c": _unit(unit_per(self.equation), self.by)}
 
-    @property
-    def expression(self) -> str:
-        """The force."""
-        return f"{self.symbols()['c']} {_written(self.by)}"
-
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """The force along the motion."""
-        return {self.equation: self.c * push(motion, self.by)}
-
-
-class PropellerRace(AbstractForce):
+class PropellerRace(AbstractDerivative):
     r"""A fin in the race of the propeller: its force grows with thrust, $\tau_i = c\,\delta\,s$ of either sign.
 
     s is the recorded thrust T, or $|n|n$ of the recorded shaft speed n: by momentum theory the square of the speed at
@@ -136,29 +96,16 @@ class PropellerRace(AbstractForce):
         return [cls(e, fin, by) for e, fin in pairs for by in facts.propulsion[:1]]
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """The one equation."""
-        return (self.equation,)
+    def derivative(self) -> Derivative:
+        """The equation by deflection and push."""
+        return Derivative(self.equation, (Power(self.fin), pushing(self.by)))
 
     def symbols(self) -> dict[str, str]:
         """SNAME symbol such as `N_rudder_nn` or `N_rudder_T`."""
         return {"c": f"{FORCES[self.equation]}_{self.fin}_{'T' if self.by == 'thrust' else 'nn'}"}
 
-    def units(self) -> dict[str, str]:
-        """Force per deflection and thrust, or square of the shaft speed."""
-        return {"c": _unit(unit_per(self.equation, self.fin), self.by)}
 
-    @property
-    def expression(self) -> str:
-        """The force."""
-        return f"{self.symbols()['c']} {self.fin} {_written(self.by)}"
-
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """The extra force of the fin along the motion."""
-        return {self.equation: self.c * motion.actuators[self.fin] * push(motion, self.by)}
-
-
-class ThrusterCrossCoupling(AbstractForce):
+class ThrusterCrossCoupling(AbstractDerivative):
     r"""An actuator that also acts on an equation other than its own: $\tau_i = c\,\delta_a$ of either sign.
 
     Source: Fossen (2021), §11.2: an entry of the thrust configuration matrix that the model has as zero.
@@ -177,25 +124,12 @@ class ThrusterCrossCoupling(AbstractForce):
         return [cls(e, a) for e in facts.equations if e != "surge" for a in acting]
 
     @property
-    def where(self) -> tuple[str, ...]:
-        """The one equation."""
-        return (self.equation,)
+    def derivative(self) -> Derivative:
+        """The equation by the actuator."""
+        return Derivative.by(self.equation, self.actuator)
 
     def symbols(self) -> dict[str, str]:
         """SNAME symbol such as `K_rudder`; `B_q_drive` for a mechanism's coordinate."""
         if self.equation in FORCES:
             return {"c": f"{FORCES[self.equation]}_{self.actuator}"}
         return {"c": f"B_{self.equation}_{self.actuator}"}
-
-    def units(self) -> dict[str, str]:
-        """Force per deflection."""
-        return {"c": unit_per(self.equation, self.actuator)}
-
-    @property
-    def expression(self) -> str:
-        """The force."""
-        return f"{self.symbols()['c']} {self.actuator}"
-
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """The force along the motion."""
-        return {self.equation: self.c * motion.actuators[self.actuator]}

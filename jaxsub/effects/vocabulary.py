@@ -8,8 +8,9 @@ from pathlib import Path
 from ..errors import InputError
 from .actuator_curves import ActuatorDeadband, ActuatorMisalignment, ActuatorSaturation, ControlSurfaceStall
 from .actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
-from .base import AbstractActuator, AbstractEffect, AbstractForce, AbstractInstrument
+from .base import AbstractActuator, AbstractDerivative, AbstractEffect, AbstractForce, AbstractInstrument
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
+from .derivative import Derivative
 from .environment import Current, WaveForcing
 from .events import MassShift, ThrustLoss
 from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss
@@ -129,8 +130,19 @@ def is_effect(kind: object) -> bool:
 
 
 def candidates(facts: Facts, kinds: tuple[type[AbstractEffect], ...] | None = None) -> list[AbstractEffect]:
-    """Every form that makes sense on a vehicle of every effect of `kinds`, by default of `vocabulary`."""
-    return [effect for kind in (vocabulary() if kinds is None else kinds) for effect in kind.candidates(facts)]
+    """Every form that makes sense on a vehicle of every effect of `kinds`, by default of `vocabulary`.
+
+    What the vehicle's own equations contain already (`Facts.has`) is no candidate.
+    """
+    every = [effect for kind in (vocabulary() if kinds is None else kinds) for effect in kind.candidates(facts)]
+    return [effect for effect in every if not (isinstance(effect, AbstractForce) and effect.term in facts.has)]
+
+
+def named(term: Derivative, facts: Facts, kinds: tuple[type[AbstractEffect], ...]) -> AbstractDerivative | None:
+    """The first effect of `kinds` whose number is the coefficient of `term`, if a vehicle of `facts` can have it."""
+    single = [kind for kind in kinds if issubclass(kind, AbstractDerivative)]
+    forms = (effect for kind in single for effect in kind.candidates(facts))
+    return next((e for e in forms if isinstance(e, AbstractDerivative) and e.derivative == term), None)
 
 
 def looked_at(facts: Facts, kinds: tuple[type[AbstractEffect], ...] | None = None) -> dict[str, int]:

@@ -51,7 +51,7 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
         "verdict": _VERDICTS[diagnosis.verdict],
         "pictures": pictures,
         "kinds": {kind: _KINDS.get(kind, kind) for kind in diagnosis.kinds},
-        "effects": tables.effects_text(vehicle_text) if diagnosis.improves else "",
+        "effects": _added(diagnosis, vehicle_text) if diagnosis.improves else "",
         "key_numbers": _key_numbers(diagnosis),
         "force_run": telling_trace(diagnosis),
         "overlay": telling_overlay(diagnosis),
@@ -64,6 +64,10 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
         "decision_rows": decision_rows(diagnosis.decisions),
     }
     return _environment().get_template("template.html.j2").render(context)
+
+
+def _added(diagnosis: Diagnosis, vehicle_text: str) -> str:
+    return tables.effects_text(vehicle_text, {coefficient.name for coefficient in diagnosis.coefficients})
 
 
 def _key_numbers(diagnosis: Diagnosis) -> list[tables.KeyNumber]:

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import tomlkit
 from markupsafe import Markup
@@ -159,10 +159,16 @@ def regime(found: Regime) -> Markup:
     return formula(found.variable) + f" {'≥' if found.above else '≤'} {size}"
 
 
-def effects_text(vehicle_text: str) -> str:
-    """The `[[effects]]` part of a vehicle file; empty when it has none."""
-    effects = tomlkit.parse(vehicle_text).get("effects")
-    return tomlkit.dumps({"effects": effects}).strip() if effects else ""
+def effects_text(vehicle_text: str, fitted: Collection[str]) -> str:
+    """What a diagnosis added to a vehicle file, as it stands there; empty when it added nothing.
+
+    That is its `[[effects]]`, and those free coefficients that are not among the `fitted`: effects of one derivative.
+    """
+    document = tomlkit.parse(vehicle_text)
+    free = lambda entry: not (isinstance(entry, Mapping) and entry.get("fixed"))
+    added = {n: entry for n, entry in document.get("coefficients", {}).items() if free(entry) and n not in fitted}
+    parts = {"coefficients": added, "effects": document.get("effects")}
+    return tomlkit.dumps({name: part for name, part in parts.items() if part}).strip()
 
 
 def _size(values: Sequence[float], quality: ChannelQuality) -> str:

@@ -1,5 +1,6 @@
 """Vehicles: one model that simulation, likelihood, filters, diagnosis and controllers share."""
 
+from .absorb import added_effects, with_coefficients
 from .base import AbstractVehicle, Layout, Output
 from .build import build
 from .checks import require_inertia
@@ -16,6 +17,7 @@ __all__ = [
     "Mechanism",
     "Output",
     "SubmergedBody",
+    "added_effects",
     "build",
     "check_units",
     "read_vehicle",
@@ -23,5 +25,6 @@ __all__ = [
     "vehicle_findings",
     "vehicle_from",
     "vehicle_text",
+    "with_coefficients",
     "write_vehicle",
 ]

@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 from collections.abc import Collection, Mapping
-from typing import Self
+from typing import Any, Self
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -51,6 +51,7 @@ class Layout:
     - `outputs`: the measured channels.
     - `parameters`: what may move, how far.
     - `length`, `diameter`: of the hull, m.
+    - `system`: in which the vehicle file gives its coefficients, in words; empty where they are in SI.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Layout:
     parameters: tuple[Parameter, ...]
     length: float = 0.0
     diameter: float = 0.0
+    system: str = ""
 
     @property
     def held(self) -> tuple[str, ...]:
@@ -140,6 +142,16 @@ class AbstractVehicle(eqx.Module):
     @abc.abstractmethod
     def own_force(self, motion: Motion) -> dict[str, Signal]:
         """Generalised forces (N, N m) other than linear damping of the free equations and effects."""
+
+    @property
+    def has(self) -> frozenset[str]:
+        """What its own equations contain of what an effect could say (`Facts.has`)."""
+        return frozenset()
+
+    @property
+    def nonlinear(self) -> tuple[Any, ...]:
+        """Parts of its own whose `force` of a motion is stepped explicitly and follows velocities."""
+        return ()
 
     @abc.abstractmethod
     def own_position_rates(self, motion: Motion) -> dict[str, Signal]:

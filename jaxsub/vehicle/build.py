@@ -1,27 +1,32 @@
 """Putting a vehicle together from named numbers."""
 
+import dataclasses
 import math
 
 import jax.numpy as jnp
 
-from ..effects import EQUATIONS, GRAVITY, AbstractEffect
+from ..effects import EQUATIONS, GRAVITY, AbstractEffect, derivative
 from ..errors import InputError
 from ..parameters import Parameter, number
 from .base import Layout, Output, memory_states
 from .checks import check_coefficients, check_coordinates, check_effects, check_names, check_outputs, require_inertia
-from .coefficient_units import ADDED, CONTROL, DAMPING
-from .control import Control
 from .damping import Damping
-from .inertia import RIGID, Inertia
+from .inertia import CENTRE_OF_GRAVITY, RIGID, Inertia
 from .mechanism import Mechanism
+from .products import Products
 from .restoring import STANDARD_DENSITY, Restoring
 from .schema import unknown_key
 from .submerged_body import SubmergedBody
 
 BODY_KEYS = (
-    "mass", "weight", "buoyancy", "inertia", "centre_of_buoyancy", "speed", "length", "diameter", "reference_density"
+    "mass", "weight", "buoyancy", "inertia", "centre_of_buoyancy", "centre_of_gravity", "speed", "length", "diameter",
+    "reference_density",
 )  # fmt: skip
-VECTORS = {"inertia": ("I_x", "I_y", "I_z"), "centre_of_buoyancy": ("x_B", "y_B", "z_B")}
+VECTORS = {
+    "inertia": ("I_x", "I_y", "I_z"),
+    "centre_of_buoyancy": ("x_B", "y_B", "z_B"),
+    "centre_of_gravity": CENTRE_OF_GRAVITY,
+}
 
 Numbers = dict[str, tuple[float, Parameter]]
 Pairs = tuple[tuple[str, str], ...]
@@ -39,6 +44,8 @@ def build(
     prescribed: Pairs = (),
     environment: Pairs = (),
     hull: dict[str, float] | None = None,
+    coriolis: str = "linear",
+    system: str = "",
     effects: tuple[AbstractEffect, ...] = (),
     effect_rows: tuple[Parameter, ...] = (),
 ) -> SubmergedBody | Mechanism:
@@ -47,6 +54,7 @@ def build(
     **Arguments**
 
     - `numbers`: value and row of every body entry and coefficient; zero where the physics has one that is absent.
+    - `coriolis`: of a body, one of `CORIOLIS`. `system`: in which the file gives its coefficients, as text.
     - `hull`: `length`, `diameter` (m; worked out from mass and inertia where absent), `reference_density` (kg/m³).
 
     **Raises** `InputError` with `where` and the key for names it does not know, and for an inertia matrix that is
@@ -64,11 +72,14 @@ def build(
     positions = _positions(equations, dict(prescribed), shown) if kind == "submerged-body" else equations
     positions += memory_states(effects)
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
-    layout = Layout(name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes)
+    layout = Layout(
+        name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes, system=system
+    )
     if kind == "mechanism":
         vehicle = _mechanism(values, layout, effects, where)
     else:
-        vehicle = _body(values, layout, effects, hull.get("reference_density", STANDARD_DENSITY), where)
+        density = hull.get("reference_density", STANDARD_DENSITY)
+        vehicle = dataclasses.replace(_body(values, layout, effects, density, where), coriolis=coriolis)
     check_outputs(vehicle, where)
     check_effects(vehicle, where)
     require_inertia(vehicle, where)
@@ -109,17 +120,19 @@ def _positions(equations: tuple[str, ...], prescribed: dict[str, str], shown: tu
 
 def _body(values: dict, layout: Layout, effects: tuple, density: float, where: str) -> SubmergedBody:
     check_names(layout, where)
-    body = {"mass", "weight", "buoyancy", "speed", *RIGID, "x_B", "y_B", "z_B"}
-    taken = lambda pattern: {n: v for n, v in values.items() if n not in body and pattern.match(n)}
-    added, damping, control = taken(ADDED), taken(DAMPING), taken(CONTROL)
-    known = body | set(added) | set(damping) | set(control)
-    check_coefficients(values, known, layout, where, control)
-    rigid = {name: values[name] for name in ("mass", "I_x", "I_y", "I_z")}
-    restoring = {name: values[name] for name in ("weight", "buoyancy", "x_B", "y_B", "z_B")}
+    body = {"mass", "weight", "buoyancy", "speed", *RIGID, *VECTORS["centre_of_buoyancy"], *CENTRE_OF_GRAVITY}
+    terms = {name: derivative(name) for name in values if name not in body}
+    check_coefficients(terms, layout, where)
+    taken = lambda sort: {name: values[name] for name, term in terms.items() if term is not None and sort(term)}
+    added, damping = taken(lambda term: term.rate), taken(lambda term: term.linear)
+    products = taken(lambda term: not (term.rate or term.linear))
+    heavy = tuple(name for name in CENTRE_OF_GRAVITY if name in values)
+    rigid = {name: values[name] for name in ("mass", "I_x", "I_y", "I_z", *heavy)}
+    restoring = {name: values[name] for name in ("weight", "buoyancy", *VECTORS["centre_of_buoyancy"], *heavy)}
     return SubmergedBody(
         inertia=Inertia(rigid, added),
         damping=Damping(damping),
-        control=Control(control),
+        products=Products(products),
         restoring=Restoring(restoring, density),
         cruise=values["speed"],
         layout=layout,

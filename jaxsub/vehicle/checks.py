@@ -1,23 +1,36 @@
 """Refusing a vehicle that cannot be, with errors that say which of its names or numbers is at fault."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Mapping
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..effects import CHANNEL_UNITS, EQUATIONS, VELOCITIES, AbstractActuator, AbstractForce, AbstractInstrument
+from ..effects import (
+    CHANNEL_UNITS,
+    EQUATIONS,
+    VELOCITIES,
+    AbstractActuator,
+    AbstractForce,
+    AbstractInstrument,
+    Derivative,
+    alike,
+)
 from ..errors import InputError, nearest
 from .base import Layout
-from .control import ACTUATORS, needs
 from .inertia import indefinite
 from .mechanism import Mechanism
+from .products import ACTUATORS
 from .schema import unknown_key
-from .submerged_body import SubmergedBody
+from .submerged_body import CURRENT, SubmergedBody
 
 MOST_COORDINATES = 30
-ENVIRONMENT = ("density", "ballast", "temperature", "altitude")
+ENVIRONMENT = ("density", "ballast", "temperature", "altitude", *CURRENT)
+GRAMMAR = (
+    "a force X Y Z K M N, then _ and 0, a rate such as vdot, or a product of u v w p q r, n, T, delta_r, delta_e, "
+    "delta_er, delta_el and delta_s, each also as |v|"
+)
 
 
 def require_inertia(vehicle: SubmergedBody | Mechanism, where: str) -> None:
@@ -71,20 +84,21 @@ def check_coordinates(layout: Layout, where: str) -> None:
             known[symbol] = meaning
 
 
-def check_coefficients(
-    values: Iterable[str], known: set[str], layout: Layout, where: str, control: Iterable[str]
-) -> None:
-    """Refuse coefficients that a body does not have, and those of `control` that no actuator of it acts through."""
+def check_coefficients(terms: Mapping[str, Derivative | None], layout: Layout, where: str) -> None:
+    """Refuse coefficients that are no derivative, say what another says, or act through an actuator there is not."""
     actuators = {actuator for actuator, _ in layout.inputs}
-    for name in values:
+    for name, term in terms.items():
         place = f"{where}: coefficients.{name}"
-        if name not in known:
-            raise unknown_key(place, _all_coefficients(), name)
-        ways = needs(name) if name in control else ()
+        if term is None:
+            close = nearest(name, _usual_coefficients())
+            raise InputError(place, "unknown key", f"{f'did you mean {close}? ' if close else ''}known: {GRAMMAR}")
+        ways = term.needs()
         if ways and not any(set(way) <= actuators for way in ways):
             raise InputError(
                 place, f"acts through {' and '.join(ways[0])}", "name that actuator's column under [inputs]"
             )
+    if same := alike(terms):
+        raise InputError(f"{where}: coefficients.{same[1]}", f"says what {same[0]} says", "delete one")
 
 
 def check_outputs(vehicle: SubmergedBody | Mechanism, where: str) -> None:
@@ -132,8 +146,9 @@ def _check_force(effect: AbstractForce, vehicle: SubmergedBody | Mechanism, plac
         )
 
 
-def _all_coefficients() -> tuple[str, ...]:
+def _usual_coefficients() -> tuple[str, ...]:
+    """Symbols that a misspelt one may have meant."""
     letters, velocities = "XYZKMN", "uvwpqr"
-    fins = ("0", "delta_r", "delta_er", "delta_el", "delta_e", "delta_s")
-    names = [f"{f}_{v}{dot}" for f in letters for v in velocities for dot in ("", "dot")]
-    return (*names, *(f"{f}_{fin}" for f in letters for fin in fins), "X_nn")
+    symbols = [f"{v}{more}" for v in velocities for more in ("", "dot", f"|{v}|")] + [f"u{v}" for v in velocities]
+    symbols += ["0", "nn", "T", "delta_r", "delta_er", "delta_el", "delta_e", "delta_s", "uu_delta_r", "uu_delta_s"]
+    return tuple(f"{letter}_{symbol}" for letter in letters for symbol in symbols)

@@ -7,10 +7,12 @@ from ..errors import InputError
 from ..recording import Recording
 from ..units import si_unit, unit_rate
 from .base import Layout
-from .control import FIN_SYMBOLS
+from .products import ACTUATORS
+from .submerged_body import CURRENT
 
-_ACTUATOR_UNITS = {**dict.fromkeys(FIN_SYMBOLS, "rad"), "thrust": "N", "shaft_speed": "rad/s"}
+_ACTUATOR_UNITS = dict.fromkeys(ACTUATORS, "rad") | {"thrust": "N", "shaft_speed": "rad/s"}
 _ENVIRONMENT_UNITS = {"density": "kg/m^3", "ballast": "m^3", "temperature": "K", "altitude": "m"}
+_ENVIRONMENT_UNITS |= dict.fromkeys(CURRENT, "m/s")
 # by SI unit: what has it, and what to write in a header
 _DIMENSIONS = {
     "rad": ("angle", "rad or deg"),

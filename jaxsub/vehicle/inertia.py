@@ -11,28 +11,39 @@ from ..arrays import Values, namespace
 from ..effects import EQUATIONS, VELOCITIES
 
 RIGID = ("mass", "mass", "mass", "I_x", "I_y", "I_z")
+CENTRE_OF_GRAVITY = ("x_G", "y_G", "z_G")
 
 
 class Inertia(eqx.Module):
-    r"""$\tilde M = M_{RB} - \{X_{\dot u}, …, N_{\dot r}\}$ about the centre of gravity (equations.md §1).
+    r"""$\tilde M = M_{RB} - \{X_{\dot u}, …, N_{\dot r}\}$ about the body's origin (equations.md §1).
+
+    The origin is the centre of gravity where that is not given. Else $M_{RB}$ has $\mp m S(r_G)$ beside its diagonal.
 
     Potential flow makes the added mass symmetric, so a coefficient given on one side only (`Y_rdot`) stands for its
     twin (`N_vdot`) too; where a source prints both, both are kept as printed.
 
     **Fields**
 
-    - `rigid`: `mass` kg, `I_x I_y I_z` kg m².
+    - `rigid`: `mass` kg, `I_x I_y I_z` kg m² about the origin; `x_G y_G z_G` m, or none of them.
     - `added`: coefficients such as `Y_vdot`, SI.
     """
 
     rigid: dict[str, Float[Array, ""]]
     added: dict[str, Float[Array, ""]]
 
+    def body_matrix(self) -> Float[Values, "6 6"]:
+        """The 6 × 6 inertia matrix of the rigid body alone."""
+        xp = namespace(*self.rigid.values())
+        diagonal = xp.diag(xp.stack([self.rigid[name] for name in RIGID]))
+        if "x_G" not in self.rigid:
+            return diagonal
+        x, y, z = (self.rigid["mass"] * self.rigid[name] for name in CENTRE_OF_GRAVITY)
+        upper = [(0, 4, z), (0, 5, -y), (1, 3, -z), (1, 5, x), (2, 3, y), (2, 4, -x)]
+        return diagonal + sparse([*upper, *((column, row, value) for row, column, value in upper)])
+
     def matrix(self) -> Float[Values, "6 6"]:
         """The 6 × 6 inertia matrix."""
-        xp = namespace(*self.rigid.values())
-        rigid = xp.diag(xp.stack([self.rigid[name] for name in RIGID]))
-        entries = []
+        rigid, entries = self.body_matrix(), []
         for name, value in self.added.items():
             row, column = place(name)
             entries.append((row, column, value))

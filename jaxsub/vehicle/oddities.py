@@ -3,14 +3,12 @@ no rigid body has."""
 
 from collections.abc import Iterator
 
-from ..effects import EQUATIONS, GRAVITY, VELOCITIES, AbstractEffect, options
+from ..effects import EQUATIONS, GRAVITY, VELOCITIES, AbstractEffect, AbstractForce, derivative, options
 from ..findings import Finding
 from .base import AbstractVehicle, Layout
-from .coefficient_units import ADDED, CONTROL, DAMPING
-from .control import needs
-from .inertia import place
 from .mechanism import Mechanism
-from .submerged_body import SubmergedBody
+from .products import derivatives
+from .submerged_body import CURRENT, SubmergedBody
 
 _TOLERANCE = 0.01  # of an inertia or a weight: such numbers are given to two or three digits
 
@@ -25,6 +23,8 @@ def vehicle_findings(vehicle: AbstractVehicle, where: str) -> tuple[Finding, ...
     if isinstance(vehicle, SubmergedBody):
         found += _rigid(vehicle, where)
         found += _locked(vehicle, where)
+        found += _twice(vehicle, where)
+        found += _converted(vehicle, where)
     if isinstance(vehicle, Mechanism):
         found += _couplings(vehicle, where)
     return (*found, *_idle(vehicle, where))
@@ -55,17 +55,34 @@ def _locked(body: SubmergedBody, where: str) -> Iterator[Finding]:
         yield Finding("locked", "warning", f"{where}: coefficients", what, f"delete them or free more in dof: {free}")
 
 
+def _twice(body: SubmergedBody, where: str) -> Iterator[Finding]:
+    for effect in body.effects:
+        if isinstance(effect, AbstractForce) and effect.term in body.has:
+            said = "[model] coriolis" if effect.term == "coriolis" else f"the coefficient {effect.term}"
+            what = f"says what {said} says, so no recording can tell them apart"
+            yield Finding("said-twice", "warning", f"{where}: effects ({effect.label})", what, "delete one")
+
+
+def _converted(body: SubmergedBody, where: str) -> Iterator[Finding]:
+    if body.layout.system:
+        values = body.own_values()
+        shown = ", ".join(f"{n} = {float(values[n]):.6g} {term.unit}" for n, term in derivatives(values).items())
+        what = f"are converted to SI from the {body.layout.system}: {shown}"
+        yield Finding("non-dimensional", "note", f"{where}: coefficients", what)
+
+
 def _acts(name: str, layout: Layout) -> bool:
     """Whether a body's number can change its motion; those of `[body]` all can."""
-    moved = {*layout.equations, *(e for e, v in VELOCITIES.items() if v in dict(layout.prescribed))}
-    if CONTROL.match(name):
-        return EQUATIONS["XYZKMN".index(name[0])] in layout.equations
-    if not ADDED.match(name) and not DAMPING.match(name):
+    if (term := derivative(name)) is None:
         return True
-    row, column = (EQUATIONS[index] for index in place(name))
-    if ADDED.match(name):  # accelerations of prescribed motions are neglected
-        return row in layout.equations and column in layout.equations
-    return row in layout.equations and column in moved
+    moved = {*layout.equations, *(e for e, v in VELOCITIES.items() if v in dict(layout.prescribed))}
+    if term.rate:  # accelerations of prescribed motions are neglected
+        moved = set(layout.equations)
+    elif not term.linear:  # a product with the speed of a body that is locked in surge
+        moved.add("surge")
+    if set(CURRENT) & set(dict(layout.environment)) and not term.rate:
+        moved |= set(EQUATIONS[:3])
+    return term.equation in layout.equations and set(term.moved) <= moved
 
 
 def _idle(vehicle: AbstractVehicle, where: str) -> Iterator[Finding]:
@@ -87,8 +104,8 @@ def _drives(vehicle: Mechanism, actuator: str) -> bool:
 def _pushes(vehicle: AbstractVehicle, actuator: str) -> bool:
     if actuator == "thrust":
         return "surge" in vehicle.layout.equations
-    control = [name for name in vehicle.own_values() if CONTROL.match(name) and _acts(name, vehicle.layout)]
-    return any(actuator in way for name in control for way in needs(name))
+    acting = [term for name, term in derivatives(vehicle.own_values()).items() if _acts(name, vehicle.layout)]
+    return any(actuator in way for term in acting for way in term.needs())
 
 
 def _words(effect: AbstractEffect) -> Iterator[str]:

@@ -5,18 +5,28 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..effects import EQUATIONS, AbstractEffect, SmoothForce, number_fields, options, parameter_table, vocabulary
+from ..effects import (
+    EQUATIONS,
+    AbstractEffect,
+    SmoothForce,
+    derivative,
+    number_fields,
+    options,
+    parameter_table,
+    vocabulary,
+)
 from ..errors import InputError
 from ..parameters import Parameter
 from .build import BODY_KEYS, VECTORS, build
 from .coefficient_units import coefficient_unit
 from .mechanism import Mechanism
+from .scales import check_scaled, read_scales
 from .schema import Table, read_number, read_option, read_outputs, read_pairs, unknown_key
-from .submerged_body import SubmergedBody
+from .submerged_body import CORIOLIS, SubmergedBody
 from .toml import check_tree, read_toml
 
 _TOP = ("schema", "name", "kind", "dof", "coefficients", "inputs", "environment", "outputs", "effects")
-_OF_BODY = ("body", "prescribed")
+_OF_BODY = ("body", "model", "prescribed")
 _SIZES = {"length": "m", "diameter": "m", "reference_density": "kg/m^3"}
 _MOST_EFFECTS = 100
 
@@ -47,9 +57,8 @@ def vehicle_from(
     if kind == "mechanism":
         top.required("dof")
     numbers = dict(body)
-    for name, entry in top.table("coefficients").items():
-        unit = coefficient_unit(name) if kind == "submerged-body" else ""
-        numbers[name] = read_number(entry, f"{where}: coefficients.{name}", Parameter(name, unit))
+    coefficients, system = _read_coefficients(top.table("coefficients"), kind == "submerged-body")
+    numbers |= coefficients
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
     built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
     return build(
@@ -59,6 +68,8 @@ def vehicle_from(
         dof=top.names("dof"),
         numbers=numbers,
         hull=extra,
+        coriolis=_read_model(top.table("model")),
+        system=system,
         inputs=read_pairs(top.table("inputs")),
         prescribed=read_pairs(top.table("prescribed")),
         environment=read_pairs(top.table("environment")),
@@ -66,6 +77,32 @@ def vehicle_from(
         effects=built_in,
         effect_rows=effect_rows,
     )
+
+
+def _read_model(table: Table) -> str:
+    """Which products of velocities `[model]` asks for."""
+    table.only(("coriolis",))
+    return table.choice("coriolis", CORIOLIS) if "coriolis" in table.data else CORIOLIS[0]
+
+
+def _read_coefficients(table: Table, body: bool) -> tuple[dict[str, tuple[float, Parameter]], str]:
+    """The numbers of `[coefficients]` in SI, and in words the system in which the file gives them if it is another.
+
+    In a file with a `system` a number that states its `unit` is in SI all the same.
+    """
+    scales = read_scales(table.table("system")) if body and "system" in table.data else None
+    numbers = {}
+    for name, entry in table.items():
+        if name == "system" and scales is not None:
+            continue
+        place, unit = table.place(name), coefficient_unit(name) if body else ""
+        number = read_number(entry, place, Parameter(name, unit))
+        stated = isinstance(entry, dict) and "unit" in entry
+        if scales is not None and not stated and (term := derivative(name)) is not None:
+            number = scales.si(term, *number)
+            check_scaled(number[0], place)
+        numbers[name] = number
+    return numbers, "" if scales is None else scales.text
 
 
 def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str, float]]:

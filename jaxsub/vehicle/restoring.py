@@ -7,17 +7,19 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..effects import GRAVITY, Signal
+from .inertia import CENTRE_OF_GRAVITY
 from .kinematics import sine_cosine
 
 STANDARD_DENSITY = 1025.0
 
 
 class Restoring(eqx.Module):
-    r"""$\tilde S(\eta)$ of a body with its origin at the centre of gravity (equations.md §1).
+    r"""$\tilde S(\eta)$ of a body (equations.md §1), with its origin at the centre of gravity where that is not given.
 
     **Fields**
 
-    - `values`: `weight`, `buoyancy` N (at `reference_density`); `x_B y_B z_B` m from the centre of gravity.
+    - `values`: `weight`, `buoyancy` N (at `reference_density`); `x_B y_B z_B`, and `x_G y_G z_G` or none of
+      them, m from the origin.
     - `reference_density`: kg/m³, the water in which `buoyancy` holds.
     """
 
@@ -34,6 +36,9 @@ class Restoring(eqx.Module):
         """Generalised force by equation at the attitude `phi`, `theta` (rad) and displaced weight `buoyancy` (N)."""
         excess = self.values["weight"] - buoyancy
         x, y, z = (self.values[name] * buoyancy for name in ("x_B", "y_B", "z_B"))
+        if "x_G" in self.values:
+            heavy = (self.values[name] * self.values["weight"] for name in CENTRE_OF_GRAVITY)
+            x, y, z = (up - down for up, down in zip((x, y, z), heavy, strict=True))
         (sin_phi, cos_phi), (pitched, cos_theta) = sine_cosine(jnp.asarray(phi)), sine_cosine(jnp.asarray(theta))
         level, rolled = cos_phi * cos_theta, sin_phi * cos_theta
         return {

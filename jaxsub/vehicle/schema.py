@@ -166,6 +166,13 @@ def _finite(value: Any, place: str) -> float:
     return number
 
 
+def read_positive(value: Any, place: str) -> float:
+    """A plain number above zero."""
+    if (size := _finite(value, place)) <= 0.0:
+        raise InputError(place, f"is {size:g}", "give a positive number")
+    return size
+
+
 def _real(value: Any) -> float:
     """`value` as a float, NaN where it is not one: TOML also holds whole numbers larger than any float."""
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -10,37 +10,49 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..arrays import Values
-from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal
+from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal, coriolis, stream
 from ..parameters import number
 from .base import AbstractVehicle, Layout, timed
-from .control import Control
 from .damping import Damping
-from .inertia import Inertia
+from .inertia import Inertia, sparse
 from .kinematics import position_rates, specific_force
+from .products import Products, derivatives
 from .restoring import Restoring
 
 _POSITIONS = ("phi", "theta", "psi", "x", "y", "z")
+CURRENT = ("current_north", "current_east")
+CORIOLIS = ("linear", "rigid-body", "full")
 
 
 class SubmergedBody(AbstractVehicle):
-    r"""$\tilde M\dot\nu = \tilde A\nu + \tilde B\delta + \tilde S(\eta)$ (equations.md §1), effects on top.
+    r"""$\tilde M\dot\nu = \tilde A\nu + \tau(\nu, \delta) - C(\nu)\nu + \tilde S(\eta)$, effects on top.
+
+    $\tilde A$ is linear damping, $\tau$ the sum of all other derivatives, and $C$ the inertia's, as `coriolis` says.
+    Where that is linear, $\tilde A$ has the turning of the operating speed in its place (equations.md §1).
+    In water that flows with $v_c$, steady and without curl, the body moves as it would in water at rest at the velocity
+    $\nu_r = \nu - [v_c\,0]$: $\tilde M\dot\nu_r$ equals the same forces, and $\dot v_c = v_c\times\nu_2$ in body axes.
+    Source: Fossen (2021), §6.8 and §10.3.
 
     Locked degrees of freedom stay at rest, surge at the operating speed; a prescribed motion comes from a column of
     the recording instead. Forces of prescribed velocities act; those of prescribed accelerations are neglected.
 
     **Fields**
 
-    - `inertia`, `damping`, `control`, `restoring`: the four matrices.
+    - `inertia`, `damping`, `products`, `restoring`: of rigid body and added mass, of linear damping, of all other
+      derivatives, of weight and buoyancy.
     - `cruise`: operating speed U_c, m/s.
+    - `coriolis`: `linear` about the operating speed, where added mass has its share in the linear derivatives; `full`
+      for rigid body and added mass; `rigid-body` where derivatives such as `X_wq` hold what is the added mass's.
     """
 
     inertia: Inertia
     damping: Damping
-    control: Control
+    products: Products
     restoring: Restoring
     cruise: Float[Array, ""]
     layout: Layout = eqx.field(static=True)
     effects: tuple[AbstractEffect, ...] = ()
+    coriolis: str = eqx.field(static=True, default="linear")
 
     def mass_matrix(self) -> Float[Values, "n n"]:
         """Inertia of the free equations."""
@@ -52,7 +64,7 @@ class SubmergedBody(AbstractVehicle):
 
     def own_values(self) -> dict[str, Array]:
         """Body data and coefficients."""
-        parts = (self.inertia.rigid, self.inertia.added, self.damping.coefficients, self.control.coefficients)
+        parts = (self.inertia.rigid, self.inertia.added, self.damping.coefficients, self.products.coefficients)
         return {name: v for part in (*parts, self.restoring.values) for name, v in part.items()} | {
             "speed": self.cruise
         }
@@ -67,7 +79,7 @@ class SubmergedBody(AbstractVehicle):
             self,
             inertia=Inertia(update(self.inertia.rigid), update(self.inertia.added)),
             damping=Damping(update(self.damping.coefficients)),
-            control=Control(update(self.control.coefficients)),
+            products=Products(update(self.products.coefficients)),
             restoring=dataclasses.replace(self.restoring, values=update(self.restoring.values)),
             cruise=number(values.get("speed", self.cruise)),
         )
@@ -88,11 +100,17 @@ class SubmergedBody(AbstractVehicle):
         buoyancy = self.restoring.buoyancy(environment)
         positions = {name: known.get(name, zero) for name in (*_POSITIONS, *self.layout.positions)}
         inertia, damping = self.inertia.matrix(), self._damping()
-        return Motion(rates, positions, pick("input "), environment, inertia, buoyancy, self.cruise, damping, time)
+        if slopes := self.products.slopes(self.cruise):
+            places = [(EQUATIONS.index(row), EQUATIONS.index(column), value) for row, column, value in slopes]
+            damping = damping + sparse(places)
+        water: dict[str, Signal] = dict(zip(EQUATIONS, _water(positions, environment, zero), strict=False))
+        return Motion(
+            rates, positions, pick("input "), environment, inertia, buoyancy, self.cruise, damping, time, water=water
+        )
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
-        """Control, restoring, and the damping of prescribed velocities."""
-        total = self.control.force(motion.actuators)
+        """Products, restoring, Coriolis, what a current adds, and the damping of prescribed velocities."""
+        total = self.products.force(motion)
         restoring = self.restoring.force(
             motion.positions["phi"], motion.positions["theta"], jnp.asarray(motion.buoyancy)
         )
@@ -103,7 +121,24 @@ class SubmergedBody(AbstractVehicle):
         for equation in self.layout.equations if moved else ():
             row = EQUATIONS.index(equation)
             total[equation] += sum(matrix[row, EQUATIONS.index(e)] * motion.rates[e] for e in moved)
+        more = [self._turning(motion)] if self.coriolis != "linear" else []
+        more += [self._drift(motion)] if motion.water else []
+        for part in more:
+            for i, equation in enumerate(EQUATIONS):
+                total[equation] = total.get(equation, 0.0) + part[..., i]
         return total
+
+    @property
+    def has(self) -> frozenset[str]:
+        """Its derivatives, by symbol, and `coriolis` where that is not linear."""
+        names = (*self.inertia.added, *self.damping.coefficients, *self.products.coefficients)
+        turning = () if self.coriolis == "linear" else ("coriolis",)
+        return frozenset((*(term.name for term in derivatives(names).values()), *turning))
+
+    @property
+    def nonlinear(self) -> tuple[Products, ...]:
+        """The products, if any follows a velocity."""
+        return (self.products,) if self.products.damp else ()
 
     def own_position_rates(self, motion: Motion) -> dict[str, Signal]:
         """Euler rates and velocity over ground."""
@@ -124,8 +159,31 @@ class SubmergedBody(AbstractVehicle):
         return found
 
     def _damping(self) -> Float[Values, "6 6"]:
-        return self.damping.matrix(self.inertia.rigid["mass"], self.cruise)
+        if self.coriolis != "linear":
+            return sparse(self.damping.own())
+        return self.damping.matrix(self.inertia.rigid, self.cruise)
+
+    def _turning(self, motion: Motion) -> Values:
+        r"""$-C(\nu_r)\nu_r$ (N, N m), (…, 6)."""
+        inertia = self.inertia.matrix() if self.coriolis == "full" else self.inertia.body_matrix()
+        flow = jnp.stack(jnp.broadcast_arrays(*(motion.flow[e] for e in EQUATIONS)), -1)
+        return coriolis(jnp.asarray(inertia), flow)
+
+    def _drift(self, motion: Motion) -> Values:
+        """What moving water changes beside the products (N, N m), (…, 6): damping, and the inertia of its turning."""
+        stacked = lambda named, keys: jnp.stack(jnp.broadcast_arrays(*(named[k] for k in keys)), -1)
+        moving, turning = stacked(motion.water, EQUATIONS[:3]), stacked(motion.rates, EQUATIONS[3:])
+        turned = jnp.cross(moving, turning)
+        return turned @ self.inertia.matrix()[:, :3].T - moving @ self._damping()[:, :3].T
 
     def _free(self, matrix: Float[Values, "6 6"]) -> Float[Values, "n n"]:
         rows = [EQUATIONS.index(e) for e in self.layout.equations]
         return matrix[np.ix_(rows, rows)]
+
+
+def _water(positions: Mapping[str, Signal], environment: Mapping[str, Signal], still: Signal) -> tuple[Signal, ...]:
+    """Velocity of the water in body axes (m/s); none where no current is recorded."""
+    north, east = (environment.get(name) for name in CURRENT)
+    if north is None and east is None:
+        return ()
+    return stream(positions, still if north is None else north, still if east is None else east)

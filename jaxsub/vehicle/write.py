@@ -12,7 +12,7 @@ from ..parameters import Parameter
 from ..storage import written_whole
 from .base import AbstractVehicle
 from .build import BODY_KEYS, VECTORS
-from .submerged_body import SubmergedBody
+from .submerged_body import CORIOLIS, SubmergedBody
 
 
 def write_vehicle(vehicle: AbstractVehicle, path: str | Path, comment: str = "") -> None:
@@ -39,6 +39,8 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     own = {name: values[name] for name in vehicle.own_values()}
     if isinstance(vehicle, SubmergedBody):
         document["body"] = _body_table(vehicle, own, rows)
+        if vehicle.coriolis != CORIOLIS[0]:
+            document["model"] = {"coriolis": vehicle.coriolis}
     coefficients = tomlkit.table()
     for name in own:
         if not isinstance(vehicle, SubmergedBody) or name not in _body_names():
@@ -71,7 +73,7 @@ def _body_names() -> set[str]:
 def _body_table(vehicle: SubmergedBody, values: dict[str, float], rows: dict[str, Parameter]) -> Any:
     table = tomlkit.table()
     for key in BODY_KEYS:
-        if key in VECTORS:
+        if key in VECTORS and VECTORS[key][0] in values:
             items = [_number_table(values[name], rows.get(name), Parameter(name, free=False)) for name in VECTORS[key]]
             table[key] = items
         elif key in values:

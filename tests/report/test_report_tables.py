@@ -66,7 +66,13 @@ def test_intervals_are_told_by_run_and_counted_when_many():
 
 
 def test_effects_are_cut_out_of_the_vehicle_file_unchanged():
-    cut = tables.effects_text(VEHICLE + "\n[outputs.r]\nsigma = 0.003\n")
+    cut = tables.effects_text(VEHICLE + "\n[outputs.r]\nsigma = 0.003\n", {"Y_v"})
     assert tomlkit.parse(cut).unwrap() == {"effects": tomlkit.parse(VEHICLE)["effects"].unwrap()}
     assert cut.startswith("[[effects]]")
-    assert tables.effects_text("schema = 1\n") == ""
+    assert tables.effects_text("schema = 1\n", ()) == ""
+
+
+def test_coefficients_that_a_diagnosis_added_are_cut_out_too():
+    """Claim: neither what was fitted before nor what is fixed is shown as added."""
+    file = '[coefficients]\nY_v = {value = -1.0}\n"K_p|p|" = {value = -0.5}\nY_vdot = {value = 2.0, fixed = true}\n'
+    assert tomlkit.parse(tables.effects_text(file, {"Y_v"})).unwrap() == {"coefficients": {"K_p|p|": {"value": -0.5}}}

@@ -1,0 +1,236 @@
+"""Hydrodynamic derivatives: the field's grammar for a force that is proportional to a product of motions and inputs."""
+
+import dataclasses
+import functools
+import re
+from collections.abc import Iterable, Sequence
+
+from .motion import EQUATIONS, FORCES, VELOCITIES, Motion, Signal, unit_per
+
+INPUT_SYMBOLS = {
+    "rudder": "delta_r",
+    "elevator_right": "delta_er",
+    "elevator_left": "delta_el",
+    "elevator": "delta_e",
+    "stern_plane": "delta_s",
+    "thrust": "T",
+    "shaft_speed": "n",
+}
+# as `Y_v|v|`, `N_u_delta_r`: factors follow each other, or stand apart by an underscore
+_SYMBOLS = {v: e for e, v in VELOCITIES.items()} | {symbol: name for name, symbol in INPUT_SYMBOLS.items()}
+_FACTOR = "|".join(sorted(_SYMBOLS, key=len, reverse=True))
+_TOKEN = re.compile(rf"_?(?:\|({_FACTOR})\||({_FACTOR}))")
+_RATE = re.compile(r"[uvwpqr]dot")
+_HIGHEST = 6  # of the sum of powers: Taylor series of the field end at the third or fifth
+# of velocities and inputs: exponents of mass, length and time
+_FORCE = (1, 1, -2)
+_DIMENSIONS: dict[str, tuple[int, int, int]] = {
+    **dict.fromkeys(EQUATIONS[:3], (0, 1, -1)),
+    **dict.fromkeys((*EQUATIONS[3:], "shaft_speed"), (0, 0, -1)),
+    "thrust": _FORCE,
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Power:
+    r"""One variable of a product: $x^k$, or $|x|^k$ or $|x|^{k-1}x$, whichever has the parity that `odd` says.
+
+    **Fields**
+
+    - `variable`: an equation of motion (its velocity) or an actuator. `power`: k.
+    - `odd`: whether the factor changes its sign with the variable's.
+    """
+
+    variable: str
+    power: int = 1
+    odd: bool = True
+
+    @property
+    def smooth(self) -> bool:
+        """Whether it needs no absolute value."""
+        return self.odd == bool(self.power % 2)
+
+    def of(self, value: Signal) -> Signal:
+        """The factor for the variable's `value`, of any shape."""
+        if self.power == 1:
+            return value if self.odd else abs(value)
+        if self.smooth:
+            return value**self.power
+        return abs(value) ** (self.power - 1) * value if self.odd else abs(value) ** self.power
+
+
+@dataclasses.dataclass(frozen=True)
+class Derivative:
+    r"""A force that is proportional to a product: $\tau_i = c\,x_1^{k_1} x_2^{k_2} \cdots$, or to an acceleration.
+
+    A coefficient of a vehicle file is one by its name (`derivative`), and so is an effect whose only number is such a
+    coefficient; both get the product, its unit and its dimension from here. Velocities are those through the water.
+
+    **Fields**
+
+    - `equation`: where the force acts. `powers`: the factors; none for a constant force.
+    - `rate`: of an added mass; the one factor is then the acceleration and not the velocity.
+    """
+
+    equation: str
+    powers: tuple[Power, ...] = ()
+    rate: bool = False
+
+    @classmethod
+    def by(cls, equation: str, *variables: str) -> "Derivative":
+        """The derivative by a product of `variables`; of two equal ones only as their square."""
+        return cls(equation, _gathered([(variable, False) for variable in variables]))
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Equations and actuators in the product, each as often as its power."""
+        return tuple(power.variable for power in self.powers for _ in range(power.power))
+
+    @property
+    def moved(self) -> tuple[str, ...]:
+        """The equations whose velocities are in the product."""
+        return tuple(power.variable for power in self.powers if power.variable in EQUATIONS)
+
+    @property
+    def linear(self) -> bool:
+        """Whether it is linear damping: proportional to one velocity."""
+        return not self.rate and len(self.variables) == 1 and self.powers[0].odd and bool(self.moved)
+
+    @property
+    def sign(self) -> int:
+        """-1 of `K_delta_el`, which the field writes with a minus: port and starboard fins roll a hull the same way."""
+        return -1 if (self.equation, self.variables) == ("roll", ("elevator_left",)) else 1
+
+    @property
+    def name(self) -> str:
+        """Its symbol in a vehicle file, such as `K_p|p|`; that of an actuator without a symbol has its own name."""
+        written = "_".join(_joined(self.powers)) or "0"
+        return f"{FORCES[self.equation]}_{written}{'dot' if self.rate else ''}"
+
+    @property
+    def unit(self) -> str:
+        """The SI unit, such as `N/(m/s)` of `Y_v` and `kg*m` of `Y_rdot`."""
+        if self.rate:
+            return ("kg", "kg*m", "kg*m^2")[sum(e in EQUATIONS[3:] for e in (self.equation, *self.variables))]
+        return unit_per(self.equation, *self.variables)
+
+    @property
+    def dimension(self) -> tuple[int, int, int]:
+        """The exponents of mass, length and time."""
+        lever = (0, 1, 0) if self.equation in EQUATIONS[3:] else (0, 0, 0)
+        total = [a + b for a, b in zip(_FORCE, lever, strict=True)]
+        for variable in self.variables:
+            total = [a - b for a, b in zip(total, _DIMENSIONS.get(variable, (0, 0, 0)), strict=True)]
+        mass, length, time = total
+        return mass, length, time + self.rate
+
+    @property
+    def expression(self) -> str:
+        """The product, as a person would write it: `|p| p`, `v r`, `rudder T`."""
+        own = VELOCITIES | {"thrust": "T", "shaft_speed": "n"}
+        if self.equation not in EQUATIONS:
+            own[self.equation] = f"{self.equation}'"
+        return " ".join(_raised(own.get(power.variable, power.variable), power) for power in self.powers)
+
+    def needs(self) -> tuple[tuple[str, ...], ...]:
+        """The sets of actuators, any one of which the product can be taken from; empty where it has none."""
+        own = tuple(power.variable for power in self.powers if power.variable not in EQUATIONS)
+        if "elevator" in own:
+            rest = tuple(name for name in own if name != "elevator")
+            return (own, (*rest, "elevator_right", "elevator_left"))
+        return (own,) if own else ()
+
+    def product(self, motion: Motion) -> Signal | float:
+        """The product along a motion, of its shape; 1 for a constant.
+
+        `elevator` is the mean of its halves where there are two. **Raises** `KeyError` for what the motion lacks.
+        """
+        parts = [power.of(_value(power.variable, motion)) for power in self.powers]
+        return functools.reduce(lambda a, b: a * b, parts) if parts else 1.0
+
+
+def _value(variable: str, motion: Motion) -> Signal:
+    if variable in motion.rates:
+        return motion.flow[variable]
+    if variable == "elevator" and variable not in motion.actuators:
+        return 0.5 * (motion.actuators["elevator_right"] + motion.actuators["elevator_left"])
+    return motion.actuators[variable]
+
+
+@functools.cache
+def derivative(name: str) -> Derivative | None:
+    """The derivative of the symbol `name`, such as `N_vvr` or `Z_w|w|`; None for what is no such symbol.
+
+    `X_nn` is $X_{nn}|n|n$, as the field has it.
+    """
+    equation = {letter: e for e, letter in FORCES.items()}.get(name[:1])
+    symbol = name[2:]
+    if equation is None or name[1:2] != "_" or len(name) > 60:
+        return None
+    if symbol == "0":
+        return Derivative(equation)
+    if _RATE.fullmatch(symbol):
+        return Derivative(equation, (Power(_SYMBOLS[symbol[0]]),), rate=True)
+    factors, at = [], 0
+    while at < len(symbol):
+        if not (token := _TOKEN.match(symbol, at)) or (not at and symbol[0] == "_"):
+            return None
+        factors.append((_SYMBOLS[token[1] or token[2]], bool(token[1])))
+        at = token.end()
+    if not factors or len(factors) > _HIGHEST:
+        return None
+    if [factor for factor in factors if factor[0] == "shaft_speed"] == [("shaft_speed", False)] * 2:
+        # a propeller that turns backwards pushes backwards
+        factors[factors.index(("shaft_speed", False))] = ("shaft_speed", True)
+    return Derivative(equation, _gathered(factors))
+
+
+def alike(names: Iterable[str]) -> tuple[str, str] | None:
+    """The first two of `names` that say the same derivative, if any do."""
+    seen: dict[Derivative, str] = {}
+    for name in names:
+        if (found := derivative(name)) is not None and (other := seen.setdefault(found, name)) != name:
+            return other, name
+    return None
+
+
+def _gathered(factors: Sequence[tuple[str, bool]]) -> tuple[Power, ...]:
+    """Factors, each a variable and whether it is absolute, as powers in the order of the field."""
+    order = [*EQUATIONS, *INPUT_SYMBOLS]
+    variables = sorted({name for name, _ in factors}, key=lambda n: (order.index(n) if n in order else len(order), n))
+    powers = []
+    for variable in variables:
+        own = [absolute for name, absolute in factors if name == variable]
+        powers.append(Power(variable, len(own), (len(own) - sum(own)) % 2 == 1))
+    return tuple(powers)
+
+
+def _joined(powers: Sequence[Power]) -> list[str]:
+    """The symbols of powers in groups that an underscore has to keep apart: `uu` and `delta_r`."""
+    groups: list[str] = []
+    for power in powers:
+        symbol = VELOCITIES.get(power.variable, INPUT_SYMBOLS.get(power.variable, power.variable))
+        text = _symbols(power, symbol)
+        if groups and power.variable in EQUATIONS:
+            groups[-1] += text
+        else:
+            groups.append(text)
+    return groups
+
+
+def _symbols(power: Power, symbol: str) -> str:
+    if power.variable == "shaft_speed" and power.power == 2:
+        return symbol * 2 if power.odd else f"|{symbol}|" * 2
+    separator = "_" if len(symbol) > 1 else ""
+    if power.smooth:
+        return separator.join([symbol] * power.power)
+    return separator.join([symbol] * (power.power - 1) + [f"|{symbol}|"])
+
+
+def _raised(name: str, power: Power) -> str:
+    raised = lambda k: {1: "", 2: "²", 3: "³"}.get(k, f"^{k}")
+    if power.smooth:
+        return f"{name}{raised(power.power)}"
+    if power.odd:
+        return f"|{name}|{raised(power.power - 1)} {name}"
+    return f"|{name}|{raised(power.power)}"
