@@ -1,13 +1,15 @@
-"""Published vehicles, linearised about their operating speed.
+"""Published vehicles, most of them linearised about their operating speed.
 
-Numbers are published ones; only the scaling to SI and the linearisation happen here. Sensor noise is that of a small
+Numbers are published ones; only the scaling to SI and the linearisation happen here. What the grammar of vehicle files
+says as it was published is a file in `published`. Sensor noise is that of a small
 AUV's usual suite (Doppler log 1 cm/s, MEMS rates 0.2 °/s, attitude 0.3 °, pressure depth 5 cm).
 """
 
+from pathlib import Path
 from typing import Any
 
 from .mechanism import Mechanism
-from .read import vehicle_from
+from .read import read_vehicle, vehicle_from
 from .submerged_body import SubmergedBody
 
 _FORCES, _MOMENTS, _LINES, _TURNS = "XYZ", "KMN", "uvw", "pqr"
@@ -108,6 +110,13 @@ def remus_100() -> SubmergedBody:
         "inputs": {"rudder": "delta_r", "stern_plane": "delta_s"},
         "outputs": _NOISE,
     })  # fmt: skip
+
+
+def remus_100_nonlinear() -> SubmergedBody:
+    """REMUS 100 with the nonlinear derivatives of Prestero (2001), all six degrees of freedom: a vehicle file."""
+    vehicle = read_vehicle(Path(__file__).parent / "published" / "remus_100.toml")
+    assert isinstance(vehicle, SubmergedBody)
+    return vehicle
 
 
 def dsrv() -> SubmergedBody:
