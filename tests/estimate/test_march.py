@@ -15,6 +15,7 @@ from jaxsub.errors import InputError
 from jaxsub.estimate import Problem, gauss_newton, scattered
 from jaxsub.estimate.problem import Expansion
 from jaxsub.simulate import simulate, synthetic
+from jaxsub.vehicle import vehicle_from
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 SIGMA = 0.02
@@ -54,7 +55,23 @@ def laden(names=None):
     return vehicle
 
 
+def nonlinear():
+    """A hull with products of velocities, fins and absolute values, Coriolis in full and a recorded current."""
+    products = {"Y_uv": -40.0, "Y_v|v|": -30.0, "N_vvr": -2.0, "K_p|p|": -2.0, "N_uu_delta_r": -7.0, "Y_|r|v": 1.0}
+    linear = {"Y_vdot": -60.0, "N_rdot": -20.0, "N_r": -20.0, "K_p": -1.0, "Y_rdot": 2.0}
+    return vehicle_from(
+        {
+            "schema": 1, "name": "hull", "kind": "submerged-body", "dof": ["sway", "roll", "yaw"],
+            "body": {"mass": 60.0, "inertia": [1.0, 12.0, 12.0], "speed": 1.5, "centre_of_gravity": [0.0, 0.0, 0.02]},
+            "model": {"coriolis": "full"}, "coefficients": linear | products, "inputs": {"rudder": "dr"},
+            "environment": {"current_north": "V"}, "outputs": {name: {"sigma": 0.01} for name in ("v", "p", "r")},
+        },
+        "hull.toml",
+    )  # fmt: skip
+
+
 CASES = {
+    "derivatives": lambda: problem(nonlinear(), lengths=(6, 5), amplitude=0.1),
     "mechanism": lambda: problem(coupled(), substeps=2),
     "known start": lambda: problem(coupled(), known_start=True),
     "body": lambda: problem(laden(FEW), lengths=(6, 5), amplitude=0.02),
