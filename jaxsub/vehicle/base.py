@@ -24,6 +24,7 @@ from ..effects import (
     with_numbers,
 )
 from ..parameters import Parameter
+from .ties import Tie
 
 _ANGLES = ("phi", "theta", "psi")
 
@@ -51,6 +52,7 @@ class Layout:
     - `outputs`: the measured channels.
     - `parameters`: what may move, how far.
     - `length`, `diameter`: of the hull, m.
+    - `ties`: numbers that follow from others.
     - `system`: in which the vehicle file gives its coefficients, in words; empty where they are in SI.
     """
 
@@ -66,6 +68,7 @@ class Layout:
     length: float = 0.0
     diameter: float = 0.0
     system: str = ""
+    ties: tuple[Tie, ...] = ()
 
     @property
     def held(self) -> tuple[str, ...]:
@@ -169,7 +172,10 @@ class AbstractVehicle(eqx.Module):
         return named
 
     def with_values(self, values: Mapping[str, Values]) -> Self:
-        """The same vehicle with other numbers for those named."""
+        """The same vehicle with other numbers for those named, and for those that follow from them."""
+        if self.layout.ties:
+            every = {**self.own_values(), **values}
+            values = {**values, **{tie.name: tie.of(every) for tie in self.layout.ties}}
         vehicle = self.with_own_values(values)
         effects = []
         for effect in self.effects:

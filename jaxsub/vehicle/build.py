@@ -17,6 +17,7 @@ from .products import Products
 from .restoring import STANDARD_DENSITY, Restoring
 from .schema import unknown_key
 from .submerged_body import SubmergedBody
+from .ties import Tie, tied_values
 
 BODY_KEYS = (
     "mass", "weight", "buoyancy", "inertia", "centre_of_buoyancy", "centre_of_gravity", "speed", "length", "diameter",
@@ -46,6 +47,7 @@ def build(
     hull: dict[str, float] | None = None,
     coriolis: str = "linear",
     system: str = "",
+    ties: tuple[Tie, ...] = (),
     effects: tuple[AbstractEffect, ...] = (),
     effect_rows: tuple[Parameter, ...] = (),
 ) -> SubmergedBody | Mechanism:
@@ -54,6 +56,7 @@ def build(
     **Arguments**
 
     - `numbers`: value and row of every body entry and coefficient; zero where the physics has one that is absent.
+    - `ties`: numbers that follow from others; `numbers` has them with any value.
     - `coriolis`: of a body, one of `CORIOLIS`. `system`: in which the file gives its coefficients, as text.
     - `hull`: `length`, `diameter` (m; worked out from mass and inertia where absent), `reference_density` (kg/m³).
 
@@ -63,6 +66,8 @@ def build(
     hull = dict(hull or {})
     rows = tuple(row for _, row in numbers.values())
     values = {key: number(value) for key, (value, _) in numbers.items()}
+    given = {key: value for key, (value, _) in numbers.items()}
+    values |= {key: number(value) for key, value in tied_values(ties, given, where).items()}
     if kind == "submerged-body":
         values = _complete(values, where)
         hull = _sizes(values, hull)
@@ -73,8 +78,9 @@ def build(
     positions += memory_states(effects)
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
     layout = Layout(
-        name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes, system=system
-    )
+        name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes, system=system,
+        ties=ties,
+    )  # fmt: skip
     if kind == "mechanism":
         vehicle = _mechanism(values, layout, effects, where)
     else:

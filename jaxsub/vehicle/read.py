@@ -23,6 +23,7 @@ from .mechanism import Mechanism
 from .scales import check_scaled, read_scales
 from .schema import Table, read_number, read_option, read_outputs, read_pairs, unknown_key
 from .submerged_body import CORIOLIS, SubmergedBody
+from .ties import Tie, read_tie
 from .toml import check_tree, read_toml
 
 _TOP = ("schema", "name", "kind", "dof", "coefficients", "inputs", "environment", "outputs", "effects")
@@ -57,7 +58,7 @@ def vehicle_from(
     if kind == "mechanism":
         top.required("dof")
     numbers = dict(body)
-    coefficients, system = _read_coefficients(top.table("coefficients"), kind == "submerged-body")
+    coefficients, system, ties = _read_coefficients(top.table("coefficients"), kind == "submerged-body")
     numbers |= coefficients
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
     built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
@@ -70,6 +71,7 @@ def vehicle_from(
         hull=extra,
         coriolis=_read_model(top.table("model")),
         system=system,
+        ties=ties,
         inputs=read_pairs(top.table("inputs")),
         prescribed=read_pairs(top.table("prescribed")),
         environment=read_pairs(top.table("environment")),
@@ -85,24 +87,28 @@ def _read_model(table: Table) -> str:
     return table.choice("coriolis", CORIOLIS) if "coriolis" in table.data else CORIOLIS[0]
 
 
-def _read_coefficients(table: Table, body: bool) -> tuple[dict[str, tuple[float, Parameter]], str]:
-    """The numbers of `[coefficients]` in SI, and in words the system in which the file gives them if it is another.
+def _read_coefficients(table: Table, body: bool) -> tuple[dict[str, tuple[float, Parameter]], str, tuple[Tie, ...]]:
+    """The numbers of `[coefficients]` in SI, the system in which the file gives them in words, and its ties.
 
     In a file with a `system` a number that states its `unit` is in SI all the same.
     """
     scales = read_scales(table.table("system")) if body and "system" in table.data else None
-    numbers = {}
+    numbers, ties = {}, []
     for name, entry in table.items():
         if name == "system" and scales is not None:
             continue
         place, unit = table.place(name), coefficient_unit(name) if body else ""
+        if isinstance(entry, str):
+            ties.append(read_tie(name, entry, place))
+            numbers[name] = 0.0, Parameter(name, unit, free=False)
+            continue
         number = read_number(entry, place, Parameter(name, unit))
         stated = isinstance(entry, dict) and "unit" in entry
         if scales is not None and not stated and (term := derivative(name)) is not None:
             number = scales.si(term, *number)
             check_scaled(number[0], place)
         numbers[name] = number
-    return numbers, "" if scales is None else scales.text
+    return numbers, "" if scales is None else scales.text, tuple(ties)
 
 
 def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str, float]]:

@@ -41,9 +41,11 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
         document["body"] = _body_table(vehicle, own, rows)
         if vehicle.coriolis != CORIOLIS[0]:
             document["model"] = {"coriolis": vehicle.coriolis}
-    coefficients = tomlkit.table()
+    coefficients, tied = tomlkit.table(), {tie.name: tie.text for tie in layout.ties}
     for name in own:
-        if not isinstance(vehicle, SubmergedBody) or name not in _body_names():
+        if name in tied:
+            coefficients[name] = tied[name]
+        elif not isinstance(vehicle, SubmergedBody) or name not in _body_names():
             row = rows.get(name, Parameter(name, free=False))
             unit = "" if isinstance(vehicle, SubmergedBody) else row.unit
             coefficients[name] = _number_table(own[name], row, Parameter(name), unit)

@@ -202,7 +202,20 @@ def test_an_input_that_acts_through_a_product_alone_is_not_idle():
 
 def test_damping_that_a_motion_carries_has_the_slopes_of_the_products():
     """Claim: about the operating speed it is the Jacobian of all forces of the water, by which a current acts."""
-    names = ("X_u|u|", "X_uu", "Y_uv", "Y_uur", "Y_v|v|", "N_u|u|v", "N_vr", "M_uq", "K_p", "Z_w", "N_uu_delta_r", "X_u")
+    names = (
+        "X_u|u|",
+        "X_uu",
+        "Y_uv",
+        "Y_uur",
+        "Y_v|v|",
+        "N_u|u|v",
+        "N_vr",
+        "M_uq",
+        "K_p",
+        "Z_w",
+        "N_uu_delta_r",
+        "X_u",
+    )
     vehicle = hull({name: -1.0 - 0.3 * i for i, name in enumerate(names)})
     state = jnp.zeros(6 + len(vehicle.layout.positions)).at[0].set(1.5)
     damping = vehicle.motion(state, jnp.zeros(4)).damping
