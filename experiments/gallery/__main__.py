@@ -16,8 +16,8 @@ import numpy as np
 from jaxsub.cli import session, terminal
 from jaxsub.discrepancy import batch
 from jaxsub.effects import VOCABULARY, AbstractEffect, amplitudes, candidates, numbers, with_numbers
-from jaxsub.estimate import predict
 from jaxsub.recording import Recording
+from jaxsub.simulate import simulate
 from jaxsub.vehicle import AbstractVehicle
 
 from .picture import draw
@@ -44,7 +44,7 @@ class Stage:
         # what an effect remembers comes last and starts at zero
         count = len(vehicle.layout.equations) + len(vehicle.layout.positions)
         start = jnp.pad(self.start, [(0, 0), (0, count - self.start.shape[1])])
-        return np.asarray(predict(vehicle, runs, start))[0]
+        return np.asarray(simulate(vehicle, runs, start))[0]
 
 
 def effect_of(scene: Scene, on: Stage) -> AbstractEffect:

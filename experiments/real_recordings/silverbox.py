@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 
 from jaxsub.discrepancy import batch
-from jaxsub.estimate import predict, search
+from jaxsub.estimate import search
 from jaxsub.recording import Recording
+from jaxsub.simulate import simulate
 from jaxsub.vehicle import AbstractVehicle, read_vehicle
 
 from ..data import data_folder
@@ -121,4 +122,4 @@ def free_run_error(vehicle: AbstractVehicle, whole: Recording) -> np.ndarray:
     """Measured less simulated (V), the initial state found from the first stretch alone."""
     first = whole.select(np.arange(len(whole.times)) < _SKIPPED)
     start = search(vehicle, batch(vehicle, [first]), sigma=jnp.array([1e-3]), moving=False).start
-    return whole.column("y") - np.asarray(predict(vehicle, batch(vehicle, [whole]), start))[0, :, 0]
+    return whole.column("y") - np.asarray(simulate(vehicle, batch(vehicle, [whole]), start))[0, :, 0]

@@ -10,13 +10,14 @@ from jaxtyping import Array, Float
 
 from ..discrepancy import batch
 from ..errors import InputError
-from ..estimate import Assessment, assess_residuals, channel_rms, initial_guess, predict, rest, search, state_channels
+from ..estimate import Assessment, assess_residuals, channel_rms, initial_guess, rest, search, state_channels
 from ..findings import Finding
 from ..likelihood import residual_outputs
 from ..recording import Recording, save
 from ..recording.runs import Runs
 from ..report.text import unit
 from ..results import RESULTS
+from ..simulate import simulate
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_findings
 from . import session, terminal
 from .output import fresh_file, paths_of
@@ -56,7 +57,7 @@ def simulated(
     with terminal.progress(f"simulating {vehicle.layout.name}"):
         runs = batch(vehicle, [recording]).padded()
         began, state, findings = initial_state(vehicle, runs, recording, start)
-        shown = predict(vehicle, runs, state[None])
+        shown = simulate(vehicle, runs, state[None])
     if not np.all(np.isfinite(np.asarray(shown))):
         raise InputError(where, "the model diverges on these inputs", "check the coefficients' signs")
     known = vehicle_findings(vehicle, vehicle.layout.name)

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import channel_rms, initial_guess, predict, search
+from ..estimate import channel_rms, initial_guess, search
 from ..likelihood import follow, residual_outputs
 from ..recording import Recording
 from ..recording.runs import Runs
+from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 from .batch import batch
 from .cross_validation import gain
@@ -71,7 +72,7 @@ def _simulated(model: Model, runs: Runs, pieces: int) -> Float[Array, "r k c"]:
     """What a model shows along `runs`, from initial states that are fitted, or in pieces from filtered states."""
     vehicle, sigma = model.fit.vehicle, model.fit.sigma
     if pieces == 1:
-        return predict(vehicle, runs, search(vehicle, runs, sigma=sigma, moving=False).start)
+        return simulate(vehicle, runs, search(vehicle, runs, sigma=sigma, moving=False).start)
     followed = follow(vehicle, runs, sigma, model.view.disturbance, *initial_guess(vehicle, runs))
     return restarted(vehicle, followed, runs, pieces)
 

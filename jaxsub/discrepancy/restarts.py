@@ -4,16 +4,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import predict
 from ..likelihood import Followed
 from ..recording.runs import Runs
+from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 
 
 def restarted(vehicle: AbstractVehicle, followed: Followed, runs: Runs, pieces: int) -> Float[Array, "r k c"]:
     """Outputs (SI) of simulations through `pieces` of each run, each from the filtered state at its first sample."""
     cut, first = runs.segments(pieces), starts(followed, pieces)
-    shown = predict(vehicle, cut, first).reshape(len(runs.times), pieces, *cut.outputs.shape[1:])
+    shown = simulate(vehicle, cut, first).reshape(len(runs.times), pieces, *cut.outputs.shape[1:])
     inner = shown[:, :, :-1].reshape(len(runs.times), -1, shown.shape[-1])
     return jnp.concatenate([inner, shown[:, -1, -1:]], axis=1)[:, : runs.times.shape[1]]
 

@@ -17,10 +17,10 @@ import numpy as np
 from jaxtyping import Array
 
 from ..effects import AbstractForce, AbstractMemory, Motion
-from ..estimate import initial_guess, predict
+from ..estimate import initial_guess
 from ..likelihood import concentrated_sigma
 from ..recording.runs import Runs
-from ..simulate import sampled_states
+from ..simulate import sampled_states, simulate
 from ..vehicle import AbstractVehicle
 from .view import Trajectory
 
@@ -103,7 +103,7 @@ def substeps_unseen(vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: A
     """
     if not _with_states(vehicle):
         return runs.substeps
-    shown = lambda steps: predict(vehicle, dataclasses.replace(runs, substeps=steps), start)
+    shown = lambda steps: simulate(vehicle, dataclasses.replace(runs, substeps=steps), start)
     steps, before = runs.substeps, shown(runs.substeps)
     while steps < FINEST:
         after = shown(2 * steps)

@@ -13,7 +13,6 @@ from ..filter.vehicle import unfilterable
 from ..likelihood import BlockLinearised, Watch, concentrated_sigma, nobody, output_errors
 from ..recording.runs import Runs
 from ..results import RESULTS
-from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 from .curvature import alone
 from .method import AbstractMethod, Passes
@@ -155,12 +154,6 @@ def search(
         if settled:
             break
     return Ended(fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=known_start)
-
-
-@eqx.filter_jit
-def predict(vehicle: AbstractVehicle, runs: Runs, start: Array) -> Float[Array, "r k c"]:
-    """`simulate`, compiled: what the sensors show, noise apart, SI."""
-    return simulate(vehicle, runs, start)
 
 
 @eqx.filter_jit

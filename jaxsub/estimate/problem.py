@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..arrays import quietly
 from ..errors import InputError
-from ..likelihood import Watch, errors, nobody, summed_products
+from ..likelihood import Watch, errors, nobody, summed_products, value_and_columns
 from ..likelihood.march import March
 from ..parameters import Transform
 from ..recording.runs import Runs
@@ -164,7 +164,7 @@ class Problem(eqx.Module):
     def expansion(self, y: Float[Array, " d"], gram: Float[Array, "r q q"]) -> "Expansion":
         """`expand` by the `products` at `y`."""
         p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
-        prior, slopes = _value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
+        prior, slopes = value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
         among = jnp.sum(gram[:, :p, :p], axis=0) + slopes.T @ slopes
         curvature = Arrow(among, gram[:, :p, p:-1], gram[:, p:-1, p:-1] + jnp.eye(s)) if s else among
         by_theta = jnp.sum(gram[:, :p, -1], axis=0) + slopes.T @ prior
@@ -187,7 +187,7 @@ class Problem(eqx.Module):
         def shown(change: Array) -> Array:
             return _outputs(self, y.at[:p].add(change[:p]), still.at[:s].add(change[p:]))
 
-        error, columns = _value_and_columns(shown, jnp.zeros(p + s))
+        error, columns = value_and_columns(shown, jnp.zeros(p + s))
         every = jnp.concatenate([columns, error[..., None]], axis=-1)
         return jnp.einsum("rkca,rkcb->rab", every, every)
 
@@ -226,12 +226,6 @@ class Expansion(eqx.Module):
     def hessian(self) -> Float[Array, "d d"]:
         """The curvature with all of its zeros."""
         return self.curvature.dense() if isinstance(self.curvature, Arrow) else self.curvature
-
-
-def _value_and_columns(f: Callable[[Array], Array], at: Float[Array, " q"]) -> tuple[Array, Array]:
-    """`f` at `at` and its Jacobian, columns last: forward mode, all columns in one batch."""
-    along = lambda tangent: jax.jvp(f, (at,), (tangent,))
-    return jax.vmap(along, out_axes=(None, -1))(jnp.eye(at.size, dtype=at.dtype))
 
 
 @eqx.filter_jit

@@ -21,7 +21,7 @@ from .disturbance import (
 from .innovation_products import part_length
 from .innovations import Followed, follow
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
-from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise, propagate
+from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise, propagate, value_and_columns
 
 __all__ = [
     "Adjoint",
@@ -57,5 +57,6 @@ __all__ = [
     "restricted",
     "smoothed",
     "summed_products",
+    "value_and_columns",
     "whitened",
 ]

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float, Int
 
 from ..effects import AbstractActuator, AbstractInstrument
 from ..recording.runs import Runs
-from ..simulate import Sampled
+from ..simulate import measure, sampled_states
 from ..vehicle import AbstractVehicle
 from .output_error import first_turns, residual_outputs
 from .sensitivity import Checkpoint, Linearised, linearise_from
@@ -153,23 +153,26 @@ def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s
     return _joined(errors, runs.times.shape[1], length)
 
 
-@eqx.filter_jit
 def _block(
     vehicle: AbstractVehicle, runs: Runs, at: Checkpoint, sigma: Array, spread: Array
 ) -> tuple[Linearised, Array, Checkpoint]:
     """The model linearised along a block, the products of its whitened columns, and where the next block begins."""
     model, after = linearise_from(vehicle, runs, at)
-    weight = (runs.mask / sigma)[..., None]
-    columns = [model.theta * weight, model.start * weight * spread, model.error[..., None] * weight]
-    every = jnp.concatenate(columns, axis=-1)
-    return model, jnp.einsum("rkca,rkcb->rab", every, every), after
+    return model, _products(model, runs, sigma, spread), after
 
 
 @eqx.filter_jit
+def _products(model: Linearised, runs: Runs, sigma: Array, spread: Array) -> Float[Array, "r q q"]:
+    weight = (runs.mask / sigma)[..., None]
+    columns = [model.theta * weight, model.start * weight * spread, model.error[..., None] * weight]
+    every = jnp.concatenate(columns, axis=-1)
+    return jnp.einsum("rkca,rkcb->rab", every, every)
+
+
 def _errors(vehicle: AbstractVehicle, runs: Runs, state: Array, turns: Array) -> tuple[Array, Array, Array]:
     """The errors of a block that begins in `state`, and where the next one begins."""
-    states = Sampled.of(vehicle, runs).states(runs, state)
-    modelled = vehicle.measure(runs.times, states, runs.signals)
+    states = sampled_states(vehicle, runs, state)
+    modelled = measure(vehicle, runs, states)
     return residual_outputs(vehicle, runs, modelled, turns), states[:, -1], first_turns(runs, modelled, turns)
 
 

@@ -151,6 +151,18 @@ def part_products(
     return np.asarray(found)[..., :count, :count], np.asarray(spreads)
 
 
+def total_products(
+    disturbance: Disturbance, system: System, columns: Columns
+) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
+    """Products of all columns whitened, and half the log-determinant of the residuals' covariance.
+
+    Columns are padded as by `part_products`.
+    """
+    count = columns.shown.shape[-1]
+    found, spreads = _part_products(disturbance, system, columns.padded(padded_width(count)), 1)
+    return jnp.sum(found, axis=(0, 1))[:count, :count], jnp.sum(spreads)
+
+
 def padded_width(count: int) -> int:
     """The least of 16, 24, 32, 48, 64, 96 … that is not less than `count`: at most half as many more."""
     power = max(16, 1 << (max(count, 1) - 1).bit_length())

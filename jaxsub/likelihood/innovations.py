@@ -20,8 +20,9 @@ from ..effects import AbstractSensor
 from ..recording.runs import Runs
 from ..simulate import Sampled
 from ..vehicle import AbstractVehicle
-from .disturbance import Columns, Disturbance, System, augmented, whitened
-from .sensitivity import jacobians
+from ..vehicle.base import wrapped
+from .disturbance import Columns, Disturbance, System, augmented, total_products
+from .sensitivity import Jacobians, jacobians
 
 
 class Followed(eqx.Module):
@@ -48,7 +49,6 @@ class Followed(eqx.Module):
     spread: Float[Array, ""]
 
 
-@eqx.filter_jit
 def follow(
     vehicle: AbstractVehicle,
     runs: Runs,
@@ -65,20 +65,33 @@ def follow(
     kept = jnp.exp(-runs.steps[runs.step_of][..., None] / disturbance.time) * force[:, :-1]
     push = jnp.stack([force[:, :-1], kept], axis=2)
     by = jacobians(vehicle, runs, filtered[:, :-1], expected, push)
-    system = System.of(by, runs, sigma, spread)
-    error = vehicle.deviation(runs.outputs, vehicle.measure(runs.times, expected, runs.signals))
+    system, residual, theta = _columns(vehicle.turning, runs, sigma, spread, expected, filtered, push, by)
+    products, logarithm = total_products(disturbance, system, residual + theta)
+    return Followed(expected, filtered, force, system, residual, theta, products, logarithm)
+
+
+@eqx.filter_jit
+def _columns(
+    turning: tuple[bool, ...],
+    runs: Runs,
+    sigma: Array,
+    spread: Array,
+    expected: Array,
+    filtered: Array,
+    push: Array,
+    by: Jacobians,
+) -> tuple[System, Columns, Columns]:
+    """The system along a path, and the columns of the residual and of the free parameters."""
+    error = wrapped(turning, runs.outputs - by.shown)
     # the path was led by its corrections and by the force; a free path from the expected state would not have been
     led = jnp.einsum("rkst,rkt->rks", by.A, (filtered - expected)[:, :-1])
     led += jnp.einsum("rksn,rkn->rks", by.G, push.reshape(*push.shape[:2], -1))
     residual = Columns(jnp.where(runs.mask, error / sigma, 0.0)[..., None], led[..., None])
     theta = Columns(jnp.where(runs.mask[..., None], by.direct / sigma[:, None], 0.0), by.F)
-    # whoever has a path wants its likelihood: in one program both are compiled in the time of one
-    white, factor = whitened(disturbance, system, residual + theta)
-    logarithm = jnp.sum(jnp.log(jnp.diagonal(factor, axis1=-2, axis2=-1)))
-    products = jnp.einsum("rkca,rkcb->ab", white, white)
-    return Followed(expected, filtered, force, system, residual, theta, products, logarithm)
+    return System.of(by, runs, sigma, spread), residual, theta
 
 
+@eqx.filter_jit
 def _path(
     vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, spread: Array
 ) -> tuple[Float[Array, "r k s"], Float[Array, "r k s"], Float[Array, "r k n"]]:

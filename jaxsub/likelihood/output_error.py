@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from ..recording.runs import Runs
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
+from ..vehicle.base import wrapped
 
 _TURN = 2.0 * jnp.pi
 
@@ -21,20 +22,31 @@ def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> 
     return residual_outputs(vehicle, runs, simulate(vehicle, runs, start))
 
 
-@eqx.filter_jit
 def residual_outputs(
     vehicle: AbstractVehicle,
     runs: Runs,
     modelled: Float[Array, "r k c"],
     turns: Float[Array, "r c"] | None = None,
 ) -> Float[Array, "r k c"]:
+    """`wrapped_errors` of what a vehicle shows."""
+    return wrapped_errors(vehicle.turning, runs, modelled, turns)
+
+
+@eqx.filter_jit
+def wrapped_errors(
+    turning: tuple[bool, ...],
+    runs: Runs,
+    modelled: Float[Array, "r k c"],
+    turns: Float[Array, "r c"] | None = None,
+) -> Float[Array, "r k c"]:
     """Measured minus `modelled`, zero where nothing was measured.
 
-    Angles are wrapped to (-π, π]. Where their turns are counted only the first sample's is: a model that turns once too
-    often is a turn off, and not right again, so that a search that begins far off finds the way back. `turns` are those
-    of `first_turns` where that sample lies before `runs`, which are then blocks of longer ones.
+    Channels that are `turning` are angles, wrapped to (-π, π]. Where their turns are counted only the first sample's
+    is: a model that turns once too often is a turn off, and not right again, so that a search that begins far off finds
+    the way back. `turns` are those of `first_turns` where that sample lies before `runs`, which are then blocks of
+    longer ones.
     """
-    error = vehicle.deviation(runs.outputs, modelled)
+    error = wrapped(turning, runs.outputs - modelled)
     if any(runs.counted):
         whole = runs.outputs - modelled
         first = first_turns(runs, modelled, turns)

@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..recording.runs import Runs
-from ..simulate import Sampled
+from ..simulate import Sampled, sampled_states
 from ..vehicle import AbstractVehicle
-from .output_error import first_turns, residual_outputs
+from .output_error import first_turns, wrapped_errors
 
 # samples whose steps are differentiated at once: few enough to stay in a core's cache, which takes a third of the time
 # that thousands take
@@ -65,6 +65,7 @@ class Jacobians(eqx.Module):
 
     - `A`, `G`, `C`: as of `Linearised`. `F`: (R, K-1, s, p) of the step by the free parameters.
     - `direct`: (R, K, c, p) of the outputs by the free parameters, the state held.
+    - `shown`: (R, K, c) the outputs themselves, SI.
     """
 
     A: Float[Array, "r k1 s s"]
@@ -72,16 +73,22 @@ class Jacobians(eqx.Module):
     C: Float[Array, "r k c s"]
     F: Float[Array, "r k1 s p"]
     direct: Float[Array, "r k c p"]
+    shown: Float[Array, "r k c"]
 
 
+# one program of it for whatever linearises a model: derivatives are most of what a model's programs take to compile
+@eqx.filter_jit
 def jacobians(
     vehicle: AbstractVehicle,
     runs: Runs,
     before: Float[Array, "r k1 s"],
     at: Float[Array, "r k s"],
-    push: Float[Array, "r k1 2 n"] | None = None,
+    push: Float[Array, "r k1 2 n"],
 ) -> Jacobians:
-    """The steps taken from the states `before`, under `push` if given, and the outputs `at` others."""
+    """The steps taken from the states `before` under the forces `push`, and the outputs `at` other states.
+
+    `push` (N, N m) acts at the start and end of each interval, and is linear between.
+    """
     names = [row.name for row in vehicle.layout.free]
     values = vehicle.values()
     theta = jnp.stack([values[name] for name in names]) if names else jnp.zeros(0)
@@ -110,9 +117,8 @@ def jacobians(
         return jax.vmap(along, out_axes=-1)(*tangents, by_node)
 
     flat = lambda array: array.reshape(r * k1, *array.shape[2:])
-    pushes = jnp.zeros((r, k1, 2, n)) if push is None else push.reshape(r, k1, 2, n)
     by_nodes = jnp.moveaxis(by_nodes, 0, 2)
-    samples = tuple(map(flat, (before, nodes, by_nodes, runs.step_of, pushes)))
+    samples = tuple(map(flat, (before, nodes, by_nodes, runs.step_of, push)))
     # a remainder would be compiled apart, in as much time again
     whole = -(-r * k1 // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
     samples = jax.tree.map(lambda a: jnp.pad(a, [(0, whole - r * k1), *[(0, 0)] * (a.ndim - 1)], mode="edge"), samples)
@@ -125,8 +131,9 @@ def jacobians(
     F, A, G = jnp.split(columns, [p, p + s], axis=-1)
     A = jnp.where(live, A, jnp.eye(s)).reshape(r, k1, s, s)
     G, F = (jnp.where(live, M, 0.0).reshape(r, k1, s, M.shape[-1]) for M in (G, F))
-    direct, C = jnp.split(_columns(shown, jnp.zeros(p + s)), [p], axis=-1)
-    return Jacobians(A, G, C, F, direct)
+    outputs, by_change = value_and_columns(shown, jnp.zeros(p + s))
+    direct, C = jnp.split(by_change, [p], axis=-1)
+    return Jacobians(A, G, C, F, direct, outputs)
 
 
 class Checkpoint(eqx.Module):
@@ -157,19 +164,26 @@ def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) 
     return linearise_from(vehicle, runs, Checkpoint.at_start(vehicle, start))[0]
 
 
-@eqx.filter_jit
 def linearise_from(vehicle: AbstractVehicle, runs: Runs, at: Checkpoint) -> tuple[Linearised, Checkpoint]:
     """`vehicle` along its trajectory from a checkpoint at the first sample of `runs`; and that at their last."""
-    states = Sampled.of(vehicle, runs).states(runs, at.state)
-    by = jacobians(vehicle, runs, states[:, :-1], states)
+    states = sampled_states(vehicle, runs, at.state)
+    unforced = jnp.zeros((*runs.live.shape, 2, len(vehicle.layout.equations)))
+    by = jacobians(vehicle, runs, states[:, :-1], states, unforced)
+    return _along(vehicle.turning, runs, at, states, by)
+
+
+@eqx.filter_jit
+def _along(
+    turning: tuple[bool, ...], runs: Runs, at: Checkpoint, states: Array, by: Jacobians
+) -> tuple[Linearised, Checkpoint]:
+    """The derivatives of each step and output put together along the states."""
     s, p = by.F.shape[-2:]
     forcing = jnp.concatenate([by.F, jnp.zeros((*by.F.shape[:2], s, s))], axis=-1)
     along = propagate(by.A, forcing, at.by)
     sensitivity = by.C @ along
-    modelled = vehicle.measure(runs.times, states, runs.signals)
-    error = residual_outputs(vehicle, runs, modelled, at.turns)
+    error = wrapped_errors(turning, runs, by.shown, at.turns)
     theta, start = sensitivity[..., :p] + by.direct, sensitivity[..., p:]
-    after = Checkpoint(states[:, -1], along[:, -1], first_turns(runs, modelled, at.turns))
+    after = Checkpoint(states[:, -1], along[:, -1], first_turns(runs, by.shown, at.turns))
     return Linearised(states, error, by.A, by.G, by.C, theta, start), after
 
 
@@ -183,6 +197,7 @@ def force_columns(
     return model.C @ propagate(model.A, forcing, jnp.zeros((r, s, q)))
 
 
-def _columns(f: Callable[[Array], Array], at: Float[Array, " q"]) -> Array:
-    """The Jacobian of `f` at `at`, its columns last: forward mode, all columns in one batch."""
-    return jax.vmap(lambda tangent: jax.jvp(f, (at,), (tangent,))[1], out_axes=-1)(jnp.eye(at.size, dtype=at.dtype))
+def value_and_columns(f: Callable[[Array], Array], at: Float[Array, " q"]) -> tuple[Array, Array]:
+    """`f` at `at` and its Jacobian, columns last: forward mode, all columns in one batch."""
+    along = lambda tangent: jax.jvp(f, (at,), (tangent,))
+    return jax.vmap(along, out_axes=(None, -1))(jnp.eye(at.size, dtype=at.dtype))

@@ -3,8 +3,8 @@
 from .continuous import integrate
 from .exponential import phi_functions, step_table
 from .manoeuvres import doublet, prbs, square, three_two_one_one
-from .sampled import Sampled, measure, simulate
-from .synthetic import at_rest, sampled_states, synthetic
+from .sampled import Sampled, measure, sampled_states, simulate
+from .synthetic import at_rest, synthetic
 
 __all__ = [
     "Sampled",

@@ -102,9 +102,17 @@ def _subdivide(nodes: Float[Array, "3 m"], parts: int) -> Float[Array, "q 3 m"]:
 
 def simulate(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
     """What the sensors of `vehicle` show at the samples of `runs`, noise apart, from the initial states `start`."""
-    return measure(vehicle, runs, Sampled.of(vehicle, runs).states(runs, start))
+    return measure(vehicle, runs, sampled_states(vehicle, runs, start))
 
 
+# whatever asks for a trajectory has this program of it, since a loop over samples takes long to compile
+@eqx.filter_jit
+def sampled_states(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
+    """States at the samples of `runs` by the sampled step; `integrate` gives them by the continuous model."""
+    return Sampled.of(vehicle, runs).states(runs, start)
+
+
+@eqx.filter_jit
 def measure(vehicle: AbstractVehicle, runs: Runs, states: Float[Array, "r k s"]) -> Float[Array, "r k c"]:
     """What the sensors show along `states`; the actuators' own dynamics are seen only through what they did."""
     return vehicle.measure(runs.times, states, runs.signals)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -13,15 +12,9 @@ from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
 from ..vehicle import AbstractVehicle
 from .continuous import integrate
-from .sampled import Sampled, measure
+from .sampled import measure
 
 States = Callable[[AbstractVehicle, Runs, Array], Array]
-
-
-@eqx.filter_jit
-def sampled_states(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
-    """States at the samples of `runs` by the sampled step; `integrate` gives them by the continuous model."""
-    return Sampled.of(vehicle, runs).states(runs, start)
 
 
 def at_rest(vehicle: AbstractVehicle, count: int) -> Float[Array, "r s"]:

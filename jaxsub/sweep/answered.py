@@ -6,8 +6,9 @@ import numpy as np
 
 from ..discrepancy.batch import batch
 from ..errors import InputError
-from ..estimate import predict, search
+from ..estimate import search
 from ..recording import Recording
+from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 
 
@@ -24,7 +25,7 @@ def answered(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> list[
     if not np.isfinite(float(found.cost)):
         what = "the model does not run from these values on " + ", ".join(r.name for r in recordings)
         raise InputError(vehicle.layout.name, what, "give values that are closer")
-    shown, made = np.asarray(predict(found.vehicle, runs, found.start)), []
+    shown, made = np.asarray(simulate(found.vehicle, runs, found.start)), []
     for recording, answer in zip(recordings, shown, strict=True):
         columns = dict(recording.columns)
         for channel, values in zip(vehicle.layout.channels, answer.T, strict=True):

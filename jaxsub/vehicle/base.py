@@ -268,9 +268,18 @@ class AbstractVehicle(eqx.Module):
 
     def deviation(self, measured: Float[Array, "*k c"], modelled: Float[Array, "*k c"]) -> Float[Array, "*k c"]:
         """`measured` minus `modelled` channels; angles of a body wrapped to (-π, π]."""
-        difference = measured - modelled
-        turns = jnp.array([channel in self.layout.angles for channel in self.layout.channels], bool)
-        return jnp.where(turns, jnp.arctan2(jnp.sin(difference), jnp.cos(difference)), difference)
+        return wrapped(self.turning, measured - modelled)
+
+    @property
+    def turning(self) -> tuple[bool, ...]:
+        """Which channels are angles of a body."""
+        return tuple(channel in self.layout.angles for channel in self.layout.channels)
+
+
+def wrapped(turning: tuple[bool, ...], difference: Float[Array, "*k c"]) -> Float[Array, "*k c"]:
+    """Differences of channels, of which those that are `turning` are wrapped to (-π, π]."""
+    around = jnp.arctan2(jnp.sin(difference), jnp.cos(difference))
+    return jnp.where(jnp.array(turning, bool), around, difference)
 
 
 def memory_states(effects: tuple[AbstractEffect, ...]) -> tuple[str, ...]:

@@ -14,8 +14,8 @@ from jaxsub.discrepancy.trial import Trial, fitted_model
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import CubicStiffness, QuadraticDamping
 from jaxsub.effects.memory import Hysteresis
-from jaxsub.estimate import evaluate, fit, gauss_newton, initial_guess, predict
-from jaxsub.simulate import synthetic
+from jaxsub.estimate import evaluate, fit, gauss_newton, initial_guess
+from jaxsub.simulate import simulate, synthetic
 from jaxsub.simulate.synthetic import integrate
 
 
@@ -78,14 +78,14 @@ def test_steps_are_halved_until_noise_hides_the_difference():
     start, sigma = initial_guess(vehicle, one)[0], jnp.array([output.sigma for output in vehicle.layout.outputs])
     steps = substeps_unseen(vehicle, one, start, sigma)
     assert batch(vehicle, bent()).substeps == steps > 1
-    exact = predict(vehicle, dataclasses.replace(one, substeps=4 * FINEST), start)
-    off = lambda n: predict(vehicle, dataclasses.replace(one, substeps=n), start) - exact
+    exact = simulate(vehicle, dataclasses.replace(one, substeps=4 * FINEST), start)
+    off = lambda n: simulate(vehicle, dataclasses.replace(one, substeps=n), start) - exact
     errors = [float(jnp.max(jnp.std(off(n), axis=(0, 1)) / sigma)) for n in (1, steps)]
     assert errors[0] > 3.0 and errors[1] < 0.025
     assert substeps_unseen(vehicle, one, start, 1e3 * sigma) == 1
     assert substeps_unseen(oscillator(), one, start[:, :2], sigma) == 1
     stiff = bending(0.05)
-    assert not bool(jnp.all(jnp.isfinite(predict(stiff, one, start))))
+    assert not bool(jnp.all(jnp.isfinite(simulate(stiff, one, start))))
     assert substeps_unseen(stiff, one, start, sigma) > steps
 
 
@@ -110,7 +110,7 @@ def test_a_file_with_fast_damping_is_simulated_as_finely_as_it_asks():
     given = driven(fast, 0.2 * np.arange(200), 0, amplitude=2.0)
     runs = batch(fast, synthetic(fast, [given], seed=2, states=integrate, noise=False))
     assert 1 < runs.substeps < FINEST
-    shown = predict(fast, runs, initial_guess(fast, runs)[0])
+    shown = simulate(fast, runs, initial_guess(fast, runs)[0])
     assert float(jnp.max(jnp.abs(shown - runs.outputs))) < 1e-2 * float(jnp.max(jnp.abs(runs.outputs)))
     assert batch(oscillator(), [given]).substeps == 1
     assert batch(oscillator().with_effect(QuadraticDamping("x", jnp.asarray(1e3))), [given]).substeps == 1
