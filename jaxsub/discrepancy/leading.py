@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..arrays import quietly
-from ..estimate import Fit, Problem, estimate_disturbance
+from ..estimate import Ended, Problem, estimate_disturbance
 from ..likelihood import Columns, Disturbance, Followed, follow
 from ..vehicle import AbstractVehicle
 from .settings import PRIOR_WIDTH
@@ -130,7 +130,7 @@ def of_order(problem: Problem) -> Problem:
     return dataclasses.replace(problem, prior_std=jax.device_put(np.where(wide, width, problem.prior_std)))
 
 
-Costed = TypeVar("Costed", Fit, At)
+Costed = TypeVar("Costed", Ended, At)
 
 
 def by_cost(found: Iterable[Costed]) -> list[Costed]:

@@ -37,14 +37,14 @@ def join(
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
     values = fit.vehicle.values()
     held = {row.name: values[row.name] for row in fit.vehicle.layout.parameters if not row.free}
-    searched = lambda start: freed(fit, start.with_values(held).holding(held))
+    searched = lambda start: search(start.with_values(held).holding(held), fit.runs, sigma=fit.sigma)
     starts = [*near, joined(view.vehicle, effects, 1.0), joined(file, [*earlier, *effects], 1.0)]
     fits = [searched(start) for start in starts]
     for share in (1.0, 0.1):
         if any(float(found.cost) < float(fit.cost) for found in fits):
             break
         fits.append(searched(joined(fit.vehicle, effects, share)))
-    return by_cost(fits)[0]
+    return evaluate(by_cost(fits)[0])
 
 
 def freed(fit: Ended, start: AbstractVehicle) -> Fit:
