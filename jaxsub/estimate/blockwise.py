@@ -7,24 +7,21 @@ import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..likelihood import block_length
 from ..results import RESULTS
 from .damped import Damped, State
 from .method import Found, Iterative, Passes, from_start
 from .pool import ending
 from .problem import Problem
 
-# samples of all runs together up to which the pool's own program, a third faster, gains less than it takes to make
-_FEW = 2_000
 # passes that a search takes as a rule, and by how much each brings it nearer at least, before it has shown itself
 _USUAL, _SLOWEST = 6, 0.7
 
 
 class GaussNewton(Iterative):
-    """Damped Gauss–Newton; one search over long or short runs goes block by block, and tells how far it is.
+    """Damped Gauss–Newton; one search goes block by block, and tells how far it is.
 
-    It takes the program that a fit's statistics need anyway. Many searches, those over runs between, and those of a
-    compiled loop go through a pool as those of any method.
+    It takes the programs that a fit's statistics need anyway. Many searches, and those of compiled C, go through a pool
+    as those of any method.
     """
 
     solver: Damped
@@ -37,7 +34,7 @@ class GaussNewton(Iterative):
         passes: Passes | None = None,
     ) -> Found:
         """As `Iterative.run`. `passes` is told of passes over all samples: how many are done and how many expected."""
-        if len(starts) > 1 or outputs is not None or problem.march is not None or _suit_pool(problem):
+        if len(starts) > 1 or outputs is not None or problem.march is not None:
             return super().run(problem, starts, outputs)
         y = trial = starts[0]
         state, tell = None, passes or (lambda done, expected: None)
@@ -55,12 +52,6 @@ class GaussNewton(Iterative):
             if bool(done) or len(decrements) >= self.max_steps:
                 break
         return _ended(y, state.at.cost, jax.device_put(np.asarray(len(decrements))), result)
-
-
-def _suit_pool(problem: Problem) -> bool:
-    """Whether the runs are one block, and long enough for a program of their own."""
-    samples = problem.runs.times.shape[1]
-    return problem.runs.times.size > _FEW and block_length(problem.vehicle, problem.runs) >= samples - 1
 
 
 @eqx.filter_jit
