@@ -54,7 +54,7 @@ def run(
         own = () if script is None else from_script(script)
         vehicle = read_vehicle(vehicle_path, own)
         require_free(vehicle, str(vehicle_path))
-        first = () if begin is None else _added(vehicle, begin, (*vocabulary(), *own))
+        first = () if begin is None else added(vehicle, begin, (*vocabulary(), *own))
         recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
         train, test = (recordings, unseen) if held else hold_out(recordings)
         keep = lambda diagnosis, improved: _keep(Answer(diagnosis, improved, None), fresh, out)
@@ -69,7 +69,7 @@ def run(
         raise KeyboardInterrupt
 
 
-def _added(vehicle: AbstractVehicle, improved: Path, kinds: tuple[type[AbstractEffect], ...]) -> list[AbstractEffect]:
+def added(vehicle: AbstractVehicle, improved: Path, kinds: tuple[type[AbstractEffect], ...]) -> list[AbstractEffect]:
     """The effects of `kinds` that the vehicle file `improved` has more than a vehicle."""
     own = [kind for kind in kinds if kind not in vocabulary()]
     found = added_effects(read_vehicle(improved, own), vehicle, kinds)

@@ -64,11 +64,13 @@ def _twice(body: SubmergedBody, where: str) -> Iterator[Finding]:
 
 
 def _converted(body: SubmergedBody, where: str) -> Iterator[Finding]:
-    if body.layout.system:
-        values = body.own_values()
-        shown = ", ".join(f"{n} = {float(values[n]):.6g} {term.unit}" for n, term in derivatives(values).items())
-        what = f"are converted to SI from the {body.layout.system}: {shown}"
-        yield Finding("non-dimensional", "note", f"{where}: coefficients", what)
+    values = body.own_values()
+    terms = derivatives(values) if body.layout.system else {}
+    for equation in EQUATIONS:
+        own = [f"{n} = {float(values[n]):.6g} {term.unit}" for n, term in terms.items() if term.equation == equation]
+        if own:
+            what = f"of {equation} in SI, from the {body.layout.system}: {', '.join(own)}"
+            yield Finding("non-dimensional", "note", f"{where}: coefficients", what)
 
 
 def _acts(name: str, layout: Layout) -> bool:

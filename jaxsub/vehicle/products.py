@@ -33,7 +33,8 @@ class Products(eqx.Module):
             # many derivatives of a hull are by the same product
             if term.powers not in products:
                 products[term.powers] = term.product(motion)
-            part = value * (term.sign * products[term.powers])
+            # no product by one: each operation is traced in every use of the model
+            part = value * (products[term.powers] if term.sign > 0 else -products[term.powers])
             total[term.equation] = total.get(term.equation, 0.0) + part
         if "thrust" in motion.actuators and _THRUST not in terms.values():
             total["surge"] = total.get("surge", 0.0) + motion.actuators["thrust"]

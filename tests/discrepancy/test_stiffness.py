@@ -17,6 +17,7 @@ from jaxsub.effects.memory import Hysteresis
 from jaxsub.estimate import evaluate, fit, gauss_newton, initial_guess
 from jaxsub.simulate import simulate, synthetic
 from jaxsub.simulate.synthetic import integrate
+from jaxsub.vehicle import vehicle_from, with_coefficients
 
 
 @pytest.fixture(scope="module")
@@ -114,3 +115,15 @@ def test_a_file_with_fast_damping_is_simulated_as_finely_as_it_asks():
     assert float(jnp.max(jnp.abs(shown - runs.outputs))) < 1e-2 * float(jnp.max(jnp.abs(runs.outputs)))
     assert batch(oscillator(), [given]).substeps == 1
     assert batch(oscillator().with_effect(QuadraticDamping("x", jnp.asarray(1e3))), [given]).substeps == 1
+
+
+def test_a_coefficient_asks_for_the_steps_that_its_effect_asks_for():
+    """Claim: square damping of heave needs several steps a sample, whether it is an effect or a coefficient."""
+    plain = vehicle_from(
+        {"schema": 1, "name": "float", "kind": "submerged-body", "dof": ["heave"], "body": {"mass": 2.0},
+         "coefficients": {"Z_T": 1.0}, "inputs": {"thrust": "T"}, "outputs": {"w": {"sigma": 0.01}}}, "float.toml",
+    )  # fmt: skip
+    effect = plain.with_effect(QuadraticDamping("heave", jnp.asarray(-40.0)))
+    runs = synthetic(effect, [driven(effect, 0.2 * np.arange(60), 1, amplitude=20.0)], seed=2)
+    steps = [batch(vehicle, runs).substeps for vehicle in (plain, effect, with_coefficients(effect))]
+    assert steps[0] == 1 < steps[1] == steps[2]

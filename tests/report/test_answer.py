@@ -1,16 +1,20 @@
 """The answer of a diagnosis on the terminal and in its folder: one content, valid JSON, whole names and numbers."""
 
 import dataclasses
+import html
 import json
 import math
+import tomllib
 
 import click
+import jax.numpy as jnp
 import pytest
 from report_examples import bare, diagnosis
 
-from jaxsub.cli.diagnose import Answer
+from jaxsub.cli.diagnose import Answer, added
 from jaxsub.cli.options import Options
 from jaxsub.discrepancy.diagnosis import Explained
+from jaxsub.effects import QuadraticDamping, numbers, vocabulary
 from jaxsub.report.text import file_stem
 from jaxsub.vehicle.catalogue import dsrv
 
@@ -42,6 +46,22 @@ def test_json_is_the_file_and_nothing_else(verdict, capsys, tmp_path):
             "report.html",
             "figures",
         }
+
+
+def test_accepted_effect_of_one_derivative_is_a_coefficient_in_file_and_page_and_is_gone_on_from(tmp_path):
+    """Claim: `improved.toml` and the report have `M_q|q|`, diagnosis.json the effect, and --begin begins with it."""
+    improved = dsrv().with_effect(QuadraticDamping("pitch", jnp.asarray(-2e4)))
+    made = diagnosis("named", samples=40)
+    known = [dataclasses.replace(made.coefficients[0], name=name) for name in dsrv().values()]
+    Answer(dataclasses.replace(made, coefficients=known), improved, None).write(tmp_path)
+    file = tomllib.loads((tmp_path / "improved.toml").read_text(encoding="utf-8"))
+    assert file["coefficients"]["M_q|q|"] == {"value": -2e4}
+    assert "effects" not in file
+    page = html.unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert '"M_q|q|" = {value = -20000.0}' in page
+    (begun,) = added(dsrv(), tmp_path / "improved.toml", vocabulary())
+    assert begun.label == "quadratic-damping[pitch]"
+    assert numbers(begun) == {"coefficient": -2e4}
 
 
 def test_the_terminal_has_the_verdict_the_effect_and_the_errors_whole(capsys, monkeypatch):
