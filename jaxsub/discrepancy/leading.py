@@ -74,7 +74,7 @@ class Led:
         problem, names = self.problem, [row.name for row in vehicle.layout.free]
         disturbance = jax.tree.map(np.asarray, disturbance)
         followed = follow(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.spread)
-        found = np.asarray(followed.products)
+        found = np.asarray(followed.products)[: 1 + len(names), : 1 + len(names)]
         length = root_or_one(np.diag(found)[1:])
         unit = np.concatenate([np.ones(1), length])
         values = vehicle.values()

@@ -36,7 +36,7 @@ class GaussNewton(Iterative):
         """As `Iterative.run`. `passes` is told of passes over all samples: how many are done and how many expected."""
         if len(starts) > 1 or outputs is not None or problem.march is not None:
             return super().run(problem, starts, outputs)
-        y = trial = starts[0]
+        y = trial = jax.device_put(np.asarray(starts)[0])
         state, tell = None, passes or (lambda done, expected: None)
         decrements: list[float] = []
         while True:

@@ -17,7 +17,7 @@ from ..recording.runs import Runs
 from ..simulate import measure, sampled_states
 from ..vehicle import AbstractVehicle
 from .output_error import first_turns, residual_outputs
-from .sensitivity import Checkpoint, Linearised, linearise_from
+from .sensitivity import Checkpoint, Jacobians, Linearised, along, with_jacobians
 
 # samples of all runs together up to which one block has all; and in a block of longer runs, where 500 to 8000 take as
 # long, within 15 %, while memory grows by 0.1 MB a sample of a body in six degrees of freedom
@@ -157,16 +157,24 @@ def _block(
     vehicle: AbstractVehicle, runs: Runs, at: Checkpoint, sigma: Array, spread: Array
 ) -> tuple[Linearised, Array, Checkpoint]:
     """The model linearised along a block, the products of its whitened columns, and where the next block begins."""
-    model, after = linearise_from(vehicle, runs, at)
-    return model, _products(model, runs, sigma, spread), after
+    return _summed(vehicle.turning, runs, at, *with_jacobians(vehicle, runs, at), sigma, spread)
 
 
 @eqx.filter_jit
-def _products(model: Linearised, runs: Runs, sigma: Array, spread: Array) -> Float[Array, "r q q"]:
+def _summed(
+    turning: tuple[bool, ...],
+    runs: Runs,
+    at: Checkpoint,
+    states: Array,
+    by: Jacobians,
+    sigma: Array,
+    spread: Array,
+) -> tuple[Linearised, Array, Checkpoint]:
+    model, after = along(turning, runs, at, states, by)
     weight = (runs.mask / sigma)[..., None]
     columns = [model.theta * weight, model.start * weight * spread, model.error[..., None] * weight]
     every = jnp.concatenate(columns, axis=-1)
-    return jnp.einsum("rkca,rkcb->rab", every, every)
+    return model, jnp.einsum("rkca,rkcb->rab", every, every), after
 
 
 def _errors(vehicle: AbstractVehicle, runs: Runs, state: Array, turns: Array) -> tuple[Array, Array, Array]:

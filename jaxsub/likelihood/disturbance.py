@@ -151,16 +151,13 @@ def part_products(
     return np.asarray(found)[..., :count, :count], np.asarray(spreads)
 
 
+@eqx.filter_jit
 def total_products(
     disturbance: Disturbance, system: System, columns: Columns
 ) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
-    """Products of all columns whitened, and half the log-determinant of the residuals' covariance.
-
-    Columns are padded as by `part_products`.
-    """
-    count = columns.shown.shape[-1]
-    found, spreads = _part_products(disturbance, system, columns.padded(padded_width(count)), 1)
-    return jnp.sum(found, axis=(0, 1))[:count, :count], jnp.sum(spreads)
+    """Products of all columns whitened, and half the log-determinant of the residuals' covariance."""
+    found, spreads = products_by_part(*steps(disturbance, system, columns), 1)
+    return jnp.sum(found, axis=(0, 1)), jnp.sum(spreads)
 
 
 def padded_width(count: int) -> int:

@@ -21,7 +21,7 @@ from ..recording.runs import Runs
 from ..simulate import Sampled
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import wrapped
-from .disturbance import Columns, Disturbance, System, augmented, total_products
+from .disturbance import Columns, Disturbance, System, augmented, padded_width, total_products
 from .sensitivity import Jacobians, jacobians
 
 
@@ -35,8 +35,8 @@ class Followed(eqx.Module):
     - `system`: linearised, steps at the filtered and outputs at the expected states.
     - `residual`: one column, the measured outputs less those expected, and what led the path away from a free run.
     - `theta`: p columns, by the free parameters.
-    - `products`: (1 + p, 1 + p) of the residual and `theta`, whitened under the disturbance; `spread`: half the
-      log-determinant of the residual's covariance.
+    - `products`: (w, w) of the residual and `theta`, whitened under the disturbance, and zeros up to the width w of a
+      program; `spread`: half the log-determinant of the residual's covariance.
     """
 
     expected: Float[Array, "r k s"]
@@ -45,7 +45,7 @@ class Followed(eqx.Module):
     system: System
     residual: Columns
     theta: Columns
-    products: Float[Array, "p1 p1"]
+    products: Float[Array, "w w"]
     spread: Float[Array, ""]
 
 
@@ -61,12 +61,10 @@ def follow(
 
     `sigma` is the noise of the channels, SI, in whose units the columns are.
     """
-    expected, filtered, force = _path(vehicle, runs, sigma, disturbance, start, spread)
-    kept = jnp.exp(-runs.steps[runs.step_of][..., None] / disturbance.time) * force[:, :-1]
-    push = jnp.stack([force[:, :-1], kept], axis=2)
-    by = jacobians(vehicle, runs, filtered[:, :-1], expected, push)
-    system, residual, theta = _columns(vehicle.turning, runs, sigma, spread, expected, filtered, push, by)
-    products, logarithm = total_products(disturbance, system, residual + theta)
+    expected, filtered, force, push = _path(vehicle, runs, sigma, disturbance, start, spread)
+    by = jacobians(vehicle, runs, filtered, expected, push)
+    system, residual, theta, whole = _columns(vehicle.turning, runs, sigma, spread, expected, filtered, push, by)
+    products, logarithm = total_products(disturbance, system, whole)
     return Followed(expected, filtered, force, system, residual, theta, products, logarithm)
 
 
@@ -80,22 +78,24 @@ def _columns(
     filtered: Array,
     push: Array,
     by: Jacobians,
-) -> tuple[System, Columns, Columns]:
-    """The system along a path, and the columns of the residual and of the free parameters."""
+) -> tuple[System, Columns, Columns, Columns]:
+    """The system along a path, the columns of the residual and of the free parameters, and both, padded."""
     error = wrapped(turning, runs.outputs - by.shown)
     # the path was led by its corrections and by the force; a free path from the expected state would not have been
     led = jnp.einsum("rkst,rkt->rks", by.A, (filtered - expected)[:, :-1])
     led += jnp.einsum("rksn,rkn->rks", by.G, push.reshape(*push.shape[:2], -1))
     residual = Columns(jnp.where(runs.mask, error / sigma, 0.0)[..., None], led[..., None])
     theta = Columns(jnp.where(runs.mask[..., None], by.direct / sigma[:, None], 0.0), by.F)
-    return System.of(by, runs, sigma, spread), residual, theta
+    whole = residual + theta
+    whole = whole.padded(padded_width(whole.shown.shape[-1]))
+    return System.of(by, runs, sigma, spread), residual, theta, whole
 
 
 @eqx.filter_jit
 def _path(
     vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, spread: Array
-) -> tuple[Float[Array, "r k s"], Float[Array, "r k s"], Float[Array, "r k n"]]:
-    """Expected and filtered states, and filtered forces."""
+) -> tuple[Float[Array, "r k s"], Float[Array, "r k s"], Float[Array, "r k n"], Float[Array, "r k1 2 n"]]:
+    """Expected and filtered states, filtered forces, and the force at both ends of each interval."""
     vehicle, outputs = _prompt(vehicle, runs)
     sampled = Sampled.of(vehicle, runs)
     nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
@@ -141,7 +141,9 @@ def _path(
 
     seen = (runs.times, runs.signals, outputs, runs.mask)
     expected, filtered = jax.vmap(run)(start, *seen, nodes, runs.step_of, runs.live)
-    return expected[..., :s], filtered[..., :s], filtered[..., s:]
+    force = filtered[..., s:]
+    kept = jnp.exp(-runs.steps[runs.step_of][..., None] / disturbance.time) * force[:, :-1]
+    return expected[..., :s], filtered[..., :s], force, jnp.stack([force[:, :-1], kept], axis=2)
 
 
 def _prompt(vehicle: AbstractVehicle, runs: Runs) -> tuple[AbstractVehicle, Float[Array, "r k c"]]:

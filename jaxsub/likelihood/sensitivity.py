@@ -81,11 +81,11 @@ class Jacobians(eqx.Module):
 def jacobians(
     vehicle: AbstractVehicle,
     runs: Runs,
-    before: Float[Array, "r k1 s"],
+    before: Float[Array, "r k s"],
     at: Float[Array, "r k s"],
     push: Float[Array, "r k1 2 n"],
 ) -> Jacobians:
-    """The steps taken from the states `before` under the forces `push`, and the outputs `at` other states.
+    """The steps taken from the states `before`, but the last, under the forces `push`; the outputs `at` other states.
 
     `push` (N, N m) acts at the start and end of each interval, and is linear between.
     """
@@ -93,6 +93,7 @@ def jacobians(
     values = vehicle.values()
     theta = jnp.stack([values[name] for name in names]) if names else jnp.zeros(0)
     with_theta = lambda vector: vehicle.with_values(dict(zip(names, vector, strict=True)))
+    before = before[:, :-1]
     r, k1, s = before.shape
     p, n = len(names), len(vehicle.layout.equations)
     basis = jnp.eye(p + s + 2 * n)
@@ -161,29 +162,30 @@ class Checkpoint(eqx.Module):
 
 def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
     """`vehicle` along its trajectory from the initial states `start`."""
-    return linearise_from(vehicle, runs, Checkpoint.at_start(vehicle, start))[0]
+    at = Checkpoint.at_start(vehicle, start)
+    return along(vehicle.turning, runs, at, *with_jacobians(vehicle, runs, at))[0]
 
 
-def linearise_from(vehicle: AbstractVehicle, runs: Runs, at: Checkpoint) -> tuple[Linearised, Checkpoint]:
-    """`vehicle` along its trajectory from a checkpoint at the first sample of `runs`; and that at their last."""
+def with_jacobians(vehicle: AbstractVehicle, runs: Runs, at: Checkpoint) -> tuple[Float[Array, "r k s"], Jacobians]:
+    """The states from a checkpoint at the first sample of `runs`, and the Jacobians there."""
     states = sampled_states(vehicle, runs, at.state)
-    unforced = jnp.zeros((*runs.live.shape, 2, len(vehicle.layout.equations)))
-    by = jacobians(vehicle, runs, states[:, :-1], states, unforced)
-    return _along(vehicle.turning, runs, at, states, by)
+    # by NumPy, for which no program has to be made
+    unforced = jax.device_put(np.zeros((*runs.live.shape, 2, len(vehicle.layout.equations))))
+    return states, jacobians(vehicle, runs, states, states, unforced)
 
 
 @eqx.filter_jit
-def _along(
+def along(
     turning: tuple[bool, ...], runs: Runs, at: Checkpoint, states: Array, by: Jacobians
 ) -> tuple[Linearised, Checkpoint]:
-    """The derivatives of each step and output put together along the states."""
+    """A model along its `states`, `by` the Jacobians there, from a checkpoint at the first; and that at the last."""
     s, p = by.F.shape[-2:]
     forcing = jnp.concatenate([by.F, jnp.zeros((*by.F.shape[:2], s, s))], axis=-1)
-    along = propagate(by.A, forcing, at.by)
-    sensitivity = by.C @ along
+    moved = propagate(by.A, forcing, at.by)
+    sensitivity = by.C @ moved
     error = wrapped_errors(turning, runs, by.shown, at.turns)
     theta, start = sensitivity[..., :p] + by.direct, sensitivity[..., p:]
-    after = Checkpoint(states[:, -1], along[:, -1], first_turns(runs, by.shown, at.turns))
+    after = Checkpoint(states[:, -1], moved[:, -1], first_turns(runs, by.shown, at.turns))
     return Linearised(states, error, by.A, by.G, by.C, theta, start), after
 
 
