@@ -12,7 +12,7 @@ from jaxsub.cli.demo import inputs
 from jaxsub.discrepancy import batch
 from jaxsub.estimate import Problem
 from jaxsub.recording import Recording
-from jaxsub.simulate.synthetic import at_rest, sampled_states, synthetic
+from jaxsub.simulate import at_rest, sampled_states, synthetic
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import nps_auv_ii
 
