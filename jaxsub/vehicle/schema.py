@@ -66,10 +66,10 @@ class Table:
         return Table(self.data.get(key, {}), self.where, name)
 
     def names(self, key: str) -> tuple[str, ...] | None:
-        """The list of words under `key`, or None."""
-        value = self.data.get(key)
-        if value is None:
+        """The list of words under `key`, None where the key is absent."""
+        if key not in self.data:
             return None
+        value = self.data[key]
         if not isinstance(value, list) or not value or not all(isinstance(item, str) for item in value):
             raise InputError(self.place(key), "is not a list of names", f'write {key} = ["…", "…"]')
         if twice := [item for i, item in enumerate(value) if item in value[:i]]:

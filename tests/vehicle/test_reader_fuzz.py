@@ -198,6 +198,13 @@ def test_many_files_with_other_values_in_them(text, data):
     is_read_or_refused(lambda: vehicle_from(tree, "vehicle.toml"), "vehicle.toml")
 
 
+def test_a_list_of_names_that_is_none_is_refused():
+    """Claim: tables that are made in Python can hold None, which is no list of names, and not an absent key either."""
+    tree = tomllib.loads(BODY) | {"effects": [{"effect": "coriolis-coupling", "equations": None}]}
+    with pytest.raises(InputError, match=r"equations.*is not a list of names"):
+        vehicle_from(tree, "vehicle.toml")
+
+
 sizes = st.floats(-1e6, 1e6).filter(lambda x: x == 0 or abs(x) > 1e-6)
 entries = st.fixed_dictionaries(
     {"value": sizes},
