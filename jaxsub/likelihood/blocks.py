@@ -16,7 +16,7 @@ from ..effects import AbstractActuator, AbstractInstrument
 from ..recording.runs import Runs
 from ..simulate import measure, sampled_states
 from ..vehicle import AbstractVehicle
-from .output_error import first_turns, residual_outputs
+from .output_error import first_turns, wrapped_errors
 from .sensitivity import Checkpoint, Jacobians, Linearised, along, with_jacobians
 
 # samples of all runs together up to which one block has all; and in a block of longer runs, where 500 to 8000 take as
@@ -180,8 +180,14 @@ def _summed(
 def _errors(vehicle: AbstractVehicle, runs: Runs, state: Array, turns: Array) -> tuple[Array, Array, Array]:
     """The errors of a block that begins in `state`, and where the next one begins."""
     states = sampled_states(vehicle, runs, state)
-    modelled = measure(vehicle, runs, states)
-    return residual_outputs(vehicle, runs, modelled, turns), states[:, -1], first_turns(runs, modelled, turns)
+    return _left(vehicle.turning, runs, states, measure(vehicle, runs, states), turns)
+
+
+@eqx.filter_jit
+def _left(
+    turning: tuple[bool, ...], runs: Runs, states: Array, modelled: Array, turns: Array
+) -> tuple[Array, Array, Array]:
+    return wrapped_errors(turning, runs, modelled, turns), states[:, -1], first_turns(runs, modelled, turns)
 
 
 def _blocks(runs: Runs, length: int, watch: Watch) -> Iterator[Runs]:

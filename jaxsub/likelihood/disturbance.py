@@ -126,7 +126,7 @@ def products(
     disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "q q"]
 ) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
     """Products of the whitened columns, the priors' included, and half the residuals' log-determinant."""
-    gram, spread = innovation_products(*steps(disturbance, system, columns))
+    gram, spread = total_products(disturbance, system, columns)
     return gram + prior, spread
 
 
@@ -156,8 +156,7 @@ def total_products(
     disturbance: Disturbance, system: System, columns: Columns
 ) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
     """Products of all columns whitened, and half the log-determinant of the residuals' covariance."""
-    found, spreads = products_by_part(*steps(disturbance, system, columns), 1)
-    return jnp.sum(found, axis=(0, 1)), jnp.sum(spreads)
+    return innovation_products(*steps(disturbance, system, columns))
 
 
 def padded_width(count: int) -> int:
