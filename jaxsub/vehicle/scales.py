@@ -6,7 +6,7 @@ import math
 from ..effects import GRAVITY, Derivative
 from ..errors import InputError
 from ..parameters import Parameter
-from .schema import Table, read_positive
+from .schema import Table, computable, read_positive
 
 # what each system is stated by, with SI units
 _SYSTEMS = {
@@ -54,5 +54,5 @@ def read_scales(table: Table) -> Scales:
 
 def check_scaled(value: float, place: str) -> None:
     """Refuse a number that its system's unit makes too large or too small to compute with."""
-    if value and not 1e-60 <= abs(value) <= 1e60:
+    if not computable(value):
         raise InputError(place, f"is {value:.3g} in SI", "check the sizes of coefficients.system")

@@ -160,10 +160,15 @@ def read_option(table: Table, key: str, field: dataclasses.Field) -> Any:
 def _finite(value: Any, place: str) -> float:
     if not math.isfinite(number := _real(value)):
         raise InputError(place, f"{value!r:.60} is not a finite number", "give a number in SI units")
-    if number and not 1.0 / _LARGEST <= abs(number) <= _LARGEST:
+    if not computable(number):
         what = f"is {number:.3g}, and sizes from {1.0 / _LARGEST:g} to {_LARGEST:g} can be computed with"
         raise InputError(place, what, "give a number in SI units")
     return number
+
+
+def computable(size: float) -> bool:
+    """Whether a number is zero, or of a size that can be computed with."""
+    return size == 0.0 or 1.0 / _LARGEST <= abs(size) <= _LARGEST
 
 
 def read_positive(value: Any, place: str) -> float:
