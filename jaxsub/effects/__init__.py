@@ -22,7 +22,7 @@ from .base import (
     with_numbers,
 )
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
-from .derivative import INPUT_SYMBOLS, Derivative, Power, alike, derivative
+from .derivative import INPUT_SYMBOLS, INPUT_UNITS, Derivative, Power, alike, derivative
 from .environment import Current, WaveForcing, stream, wave_band
 from .events import MassShift, ThrustLoss
 from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss, coriolis
@@ -58,6 +58,7 @@ __all__ = [
     "FORCE_UNITS",
     "GRAVITY",
     "INPUT_SYMBOLS",
+    "INPUT_UNITS",
     "KNOTS",
     "VELOCITIES",
     "VOCABULARY",

@@ -16,11 +16,14 @@ INPUT_SYMBOLS = {
     "thrust": "T",
     "shaft_speed": "n",
 }
+INPUT_UNITS: dict[str, str] = dict.fromkeys(INPUT_SYMBOLS, "rad") | {"thrust": "N", "shaft_speed": "rad/s"}
 # as `Y_v|v|`, `N_u_delta_r`: factors follow each other, or stand apart by an underscore
 _SYMBOLS = {v: e for e, v in VELOCITIES.items()} | {symbol: name for name, symbol in INPUT_SYMBOLS.items()}
 _FACTOR = "|".join(sorted(_SYMBOLS, key=len, reverse=True))
 _TOKEN = re.compile(rf"_?(?:\|({_FACTOR})\||({_FACTOR}))")
 _RATE = re.compile(r"[uvwpqr]dot")
+# as `B_yaw_bow_thruster`, of an input that has no symbol
+_BY_NAME = re.compile(rf"B_({'|'.join(EQUATIONS)})_([A-Za-z_]\w*)")
 _HIGHEST = 6  # of the sum of powers: Taylor series of the field end at the third or fifth
 # of velocities and inputs: exponents of mass, length and time
 _FORCE = (1, 1, -2)
@@ -103,20 +106,29 @@ class Derivative:
 
     @property
     def name(self) -> str:
-        """Its symbol in a vehicle file, such as `K_p|p|`; that of an actuator without a symbol has its own name."""
+        """Its symbol in a vehicle file, such as `K_p|p|`; by an input without a symbol alone, `B_yaw_bow_thruster`."""
+        if not self.dimensional and self.powers == (Power(self.variables[0]),):
+            return f"B_{self.equation}_{self.variables[0]}"
         written = "_".join(_joined(self.powers)) or "0"
         return f"{FORCES[self.equation]}_{written}{'dot' if self.rate else ''}"
 
     @property
+    def dimensional(self) -> bool:
+        """Whether the dimension of every factor is known, as that of an input without a symbol is not."""
+        return all(variable in EQUATIONS or variable in INPUT_SYMBOLS for variable in self.variables)
+
+    @property
     def unit(self) -> str:
-        """The SI unit, such as `N/(m/s)` of `Y_v` and `kg*m` of `Y_rdot`."""
+        """The SI unit, such as `N/(m/s)` of `Y_v` and `kg*m` of `Y_rdot`; empty where it is not known."""
+        if self.equation in EQUATIONS and not self.dimensional:
+            return ""
         if self.rate:
             return ("kg", "kg*m", "kg*m^2")[sum(e in EQUATIONS[3:] for e in (self.equation, *self.variables))]
         return unit_per(self.equation, *self.variables)
 
     @property
     def dimension(self) -> tuple[int, int, int]:
-        """The exponents of mass, length and time."""
+        """The exponents of mass, length and time, where the derivative is `dimensional`."""
         lever = (0, 1, 0) if self.equation in EQUATIONS[3:] else (0, 0, 0)
         total = [a + b for a, b in zip(_FORCE, lever, strict=True)]
         for variable in self.variables:
@@ -161,8 +173,10 @@ def _value(variable: str, motion: Motion) -> Signal:
 def derivative(name: str) -> Derivative | None:
     """The derivative of the symbol `name`, such as `N_vvr` or `Z_w|w|`; None for what is no such symbol.
 
-    `X_nn` is $X_{nn}|n|n$, as the field has it.
+    `X_nn` is $X_{nn}|n|n$, as the field has it. `B_yaw_bow_thruster` is the moment by any input of that name.
     """
+    if by_name := _BY_NAME.fullmatch(name):
+        return Derivative(by_name[1], (Power(by_name[2]),))
     equation = {letter: e for e, letter in FORCES.items()}.get(name[:1])
     symbol = name[2:]
     if equation is None or name[1:2] != "_" or len(name) > 60:

@@ -13,6 +13,7 @@ FORCES: dict[str, str] = dict(zip(EQUATIONS, "XYZKMN", strict=True))
 FORCE_UNITS: dict[str, str] = dict(zip(EQUATIONS, ["N"] * 3 + ["N m"] * 3, strict=True))
 GRAVITY = 9.80665
 PROPULSION = ("shaft_speed", "thrust")
+FINS = ("rudder", "elevator_right", "elevator_left", "elevator", "stern_plane")
 _CHANNELS = {
     "m/s": ("u", "v", "w", "speed", "depth_rate"),
     "rad/s": ("p", "q", "r", "heading_rate"),
@@ -94,6 +95,7 @@ class Facts(eqx.Module):
     - `output_range`: least and largest of what was recorded of each channel.
     - `depth_range`: least and largest depth, m.
     - `has`: what the vehicle's own equations contain of what an effect could say: names of `Derivative`s, `coriolis`.
+      An actuator by a name of its own has those of its force; a control surface has one such as `N_uu_port_fin`.
     - `tones`: frequencies (rad/s) at which what each equation misses stands out, inside `wave_band`; `frequencies`: how
       many they were chosen among.
 
@@ -133,8 +135,9 @@ class Facts(eqx.Module):
     @property
     def fins(self) -> tuple[str, ...]:
         """The actuators of a body that deflect."""
+        lifting = lambda name: any(f"{force}_uu_{name}" in self.has for force in FORCES.values())
         body = self.kind == "submerged-body"
-        return tuple(name for name in self.actuators if body and name not in PROPULSION)
+        return tuple(name for name in self.actuators if body and (name in FINS or lifting(name)))
 
     @property
     def propulsion(self) -> tuple[str, ...]:

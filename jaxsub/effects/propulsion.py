@@ -8,7 +8,7 @@ from jaxtyping import Array
 
 from .base import AbstractDerivative, amplitude
 from .derivative import Derivative, Power
-from .motion import FORCES, Facts
+from .motion import FINS, FORCES, Facts
 
 
 class PropellerTorque(AbstractDerivative):
@@ -90,9 +90,8 @@ class PropellerRace(AbstractDerivative):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[PropellerRace]":
-        """Rudders in sway and yaw, stern planes and elevators in heave and pitch, where propulsion is recorded."""
-        turned = {fin: ("sway", "yaw") if fin == "rudder" else ("heave", "pitch") for fin in facts.fins}
-        pairs = [(e, fin) for fin, plane in turned.items() for e in plane if e in facts.equations]
+        """Each fin in the equations that it turns the body by, where propulsion is recorded."""
+        pairs = [(e, fin) for fin in facts.fins for e in _turned(fin, facts) if e in facts.equations]
         return [cls(e, fin, by) for e, fin in pairs for by in facts.propulsion[:1]]
 
     @property
@@ -103,6 +102,13 @@ class PropellerRace(AbstractDerivative):
     def symbols(self) -> dict[str, str]:
         """SNAME symbol such as `N_rudder_nn` or `N_rudder_T`."""
         return {"c": f"{FORCES[self.equation]}_{self.fin}_{'T' if self.by == 'thrust' else 'nn'}"}
+
+
+def _turned(fin: str, facts: Facts) -> tuple[str, ...]:
+    """The equations of a fin's lift: a rudder's, a stern plane's, or where the vehicle has that of another name."""
+    if fin in FINS:
+        return ("sway", "yaw") if fin == "rudder" else ("heave", "pitch")
+    return tuple(e for e, letter in FORCES.items() if f"{letter}_uu_{fin}" in facts.has)
 
 
 class ThrusterCrossCoupling(AbstractDerivative):
@@ -119,8 +125,8 @@ class ThrusterCrossCoupling(AbstractDerivative):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[ThrusterCrossCoupling]":
-        """Each fin or drive on each free equation but surge; one that the model has already adds nothing."""
-        acting = facts.fins if facts.kind == "submerged-body" else facts.actuators
+        """Each input but the main propulsion on each free equation but surge, where the model has none."""
+        acting = [name for name in facts.actuators if name not in facts.propulsion]
         return [cls(e, a) for e in facts.equations if e != "surge" for a in acting]
 
     @property

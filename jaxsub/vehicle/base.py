@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from ..arrays import Values
 from ..effects import (
     CHANNEL_UNITS,
+    INPUT_UNITS,
     VELOCITIES,
     AbstractActuator,
     AbstractEffect,
@@ -53,6 +54,7 @@ class Layout:
     - `parameters`: what may move, how far.
     - `length`, `diameter`: of the hull, m.
     - `ties`: numbers that follow from others.
+    - `input_units`: (input, SI unit) pairs of inputs other than those with a symbol, where that is known.
     - `system`: in which the vehicle file gives its coefficients, in words; empty where they are in SI.
     """
 
@@ -69,6 +71,7 @@ class Layout:
     diameter: float = 0.0
     system: str = ""
     ties: tuple[Tie, ...] = ()
+    input_units: tuple[tuple[str, str], ...] = ()
 
     @property
     def held(self) -> tuple[str, ...]:
@@ -109,6 +112,11 @@ class Layout:
     def unit(self, name: str) -> str:
         """The SI unit of a body's channel or state; nothing for a mechanism's, whose `q` may be in metres or volts."""
         return CHANNEL_UNITS.get(name, "") if self.kind == "submerged-body" else ""
+
+    def input_unit(self, name: str) -> str:
+        """The SI unit of an input; nothing where the vehicle file does not say."""
+        known = INPUT_UNITS if self.kind == "submerged-body" else {}
+        return known.get(name) or dict(self.input_units).get(name, "")
 
 
 class AbstractVehicle(eqx.Module):

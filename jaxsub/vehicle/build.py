@@ -8,8 +8,17 @@ import jax.numpy as jnp
 from ..effects import EQUATIONS, GRAVITY, AbstractEffect, derivative
 from ..errors import InputError
 from ..parameters import Parameter, number
+from .actuators import Actuators
 from .base import Layout, Output, memory_states
-from .checks import check_coefficients, check_coordinates, check_effects, check_names, check_outputs, require_inertia
+from .checks import (
+    check_coefficients,
+    check_coordinates,
+    check_effects,
+    check_inputs,
+    check_names,
+    check_outputs,
+    require_inertia,
+)
 from .damping import Damping
 from .inertia import CENTRE_OF_GRAVITY, RIGID, Inertia
 from .mechanism import Mechanism
@@ -48,6 +57,8 @@ def build(
     coriolis: str = "linear",
     system: str = "",
     ties: tuple[Tie, ...] = (),
+    input_units: dict[str, str] | None = None,
+    actuators: Actuators | None = None,
     effects: tuple[AbstractEffect, ...] = (),
     effect_rows: tuple[Parameter, ...] = (),
 ) -> SubmergedBody | Mechanism:
@@ -56,6 +67,7 @@ def build(
     **Arguments**
 
     - `numbers`: value and row of every body entry and coefficient; zero where the physics has one that is absent.
+    - `input_units`: SI units of inputs that have no symbol. `actuators`: those of a body; `numbers` has theirs too.
     - `ties`: numbers that follow from others; `numbers` has them with any value.
     - `coriolis`: of a body, one of `CORIOLIS`. `system`: in which the file gives its coefficients, as text.
     - `hull`: `length`, `diameter` (m; worked out from mass and inertia where absent), `reference_density` (kg/m³).
@@ -79,13 +91,15 @@ def build(
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
     layout = Layout(
         name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes, system=system,
-        ties=ties,
+        ties=ties, input_units=tuple((input_units or {}).items()),
     )  # fmt: skip
     if kind == "mechanism":
         vehicle = _mechanism(values, layout, effects, where)
     else:
         density = hull.get("reference_density", STANDARD_DENSITY)
-        vehicle = dataclasses.replace(_body(values, layout, effects, density, where), coriolis=coriolis)
+        devices = (actuators or Actuators()).in_water(density).with_values(values)
+        body = _body(values, layout, effects, devices, density, where)
+        vehicle = dataclasses.replace(body, coriolis=coriolis)
     check_outputs(vehicle, where)
     check_effects(vehicle, where)
     require_inertia(vehicle, where)
@@ -124,10 +138,22 @@ def _positions(equations: tuple[str, ...], prescribed: dict[str, str], shown: tu
     return (*states, "z") if "z" not in prescribed else tuple(states)
 
 
-def _body(values: dict, layout: Layout, effects: tuple, density: float, where: str) -> SubmergedBody:
+def _body(
+    values: dict, layout: Layout, effects: tuple, devices: Actuators, density: float, where: str
+) -> SubmergedBody:
     check_names(layout, where)
-    body = {"mass", "weight", "buoyancy", "speed", *RIGID, *VECTORS["centre_of_buoyancy"], *CENTRE_OF_GRAVITY}
+    body = {
+        *devices.values(),
+        "mass",
+        "weight",
+        "buoyancy",
+        "speed",
+        *RIGID,
+        *VECTORS["centre_of_buoyancy"],
+        *CENTRE_OF_GRAVITY,
+    }
     terms = {name: derivative(name) for name in values if name not in body}
+    check_inputs(layout, (*devices.items, *effects, *terms.values()), where)
     check_coefficients(terms, layout, where)
     taken = lambda sort: {name: values[name] for name, term in terms.items() if term is not None and sort(term)}
     added, damping = taken(lambda term: term.rate), taken(lambda term: term.linear)
@@ -143,6 +169,7 @@ def _body(values: dict, layout: Layout, effects: tuple, density: float, where: s
         cruise=values["speed"],
         layout=layout,
         effects=effects,
+        actuators=devices,
     )
 
 

@@ -1,7 +1,7 @@
 """Refusing a vehicle that cannot be, with errors that say which of its names or numbers is at fault."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import jax
 import jax.numpy as jnp
@@ -12,12 +12,15 @@ from ..effects import (
     EQUATIONS,
     VELOCITIES,
     AbstractActuator,
+    AbstractEffect,
     AbstractForce,
     AbstractInstrument,
     Derivative,
     alike,
+    options,
 )
 from ..errors import InputError, nearest
+from .actuators import Actuator
 from .base import Layout
 from .inertia import indefinite
 from .mechanism import Mechanism
@@ -29,7 +32,7 @@ MOST_COORDINATES = 30
 ENVIRONMENT = ("density", "ballast", "temperature", "altitude", *CURRENT)
 GRAMMAR = (
     "a force X Y Z K M N, then _ and 0, a rate such as vdot, or a product of u v w p q r, n, T, delta_r, delta_e, "
-    "delta_er, delta_el and delta_s, each also as |v|"
+    "delta_er, delta_el and delta_s, each also as |v|; or B_yaw_NAME of any input NAME"
 )
 
 
@@ -47,7 +50,6 @@ def check_names(layout: Layout, where: str) -> None:
     motions = (*VELOCITIES.values(), "phi", "theta", "psi", "x", "y", "z")
     for section, names, known in (
         ("dof", layout.equations, EQUATIONS),
-        ("inputs", [n for n, _ in layout.inputs], ACTUATORS),
         ("prescribed", [n for n, _ in layout.prescribed], motions),
         ("environment", [n for n, _ in layout.environment], ENVIRONMENT),
     ):
@@ -60,6 +62,35 @@ def check_names(layout: Layout, where: str) -> None:
             raise InputError(
                 f"{where}: prescribed.{name}", f"{equation} is free", "leave it out of dof or of prescribed"
             )
+
+
+def check_inputs(layout: Layout, parts: Iterable[Actuator | AbstractEffect | Derivative | None], where: str) -> None:
+    """Refuse inputs that have no symbol and that none of `parts` acts through, and those named as something else is."""
+    used = {name for part in parts for name in inputs_of(part)}
+    taken = {*CHANNEL_UNITS, *ENVIRONMENT, *EQUATIONS}
+    for name, _ in layout.inputs:
+        place = f"{where}: inputs.{name}"
+        if name in taken or not name.isidentifier():
+            what = "is the name of a motion or of surroundings" if name in taken else "is not a word"
+            raise InputError(place, what, "give the input another name of letters, digits and _")
+        if name not in (*ACTUATORS, *used):
+            close = nearest(name, (*ACTUATORS, *used))
+            known = f"known: {', '.join(ACTUATORS)}, and any that [actuators.{name}] or B_yaw_{name} acts through"
+            raise InputError(place, "unknown key", f"did you mean {close}? {known}" if close else known)
+
+
+def inputs_of(part: Actuator | AbstractEffect | Derivative | None) -> Iterator[str]:
+    """The inputs that an actuator or a coefficient acts through, and the names that an effect is told."""
+    if isinstance(part, Derivative):
+        yield from part.variables
+    elif isinstance(part, Actuator):
+        yield from dict(part.input)
+    elif part is not None:
+        for value in options(part).values():
+            if isinstance(value, str):
+                yield from (value, *value.split(","))
+            elif isinstance(value, tuple):
+                yield from value
 
 
 def check_coordinates(layout: Layout, where: str) -> None:

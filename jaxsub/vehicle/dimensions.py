@@ -7,10 +7,8 @@ from ..errors import InputError
 from ..recording import Recording
 from ..units import si_unit, unit_rate
 from .base import Layout
-from .products import ACTUATORS
 from .submerged_body import CURRENT
 
-_ACTUATOR_UNITS = dict.fromkeys(ACTUATORS, "rad") | {"thrust": "N", "shaft_speed": "rad/s"}
 _ENVIRONMENT_UNITS = {"density": "kg/m^3", "ballast": "m^3", "temperature": "K", "altitude": "m"}
 _ENVIRONMENT_UNITS |= dict.fromkeys(CURRENT, "m/s")
 # by SI unit: what has it, and what to write in a header
@@ -55,19 +53,25 @@ def check_units(layout: Layout, recordings: Sequence[Recording]) -> None:
 def _taken(layout: Layout) -> Iterator[tuple[str, str]]:
     """The columns that a vehicle takes from a recording, each with its SI unit, empty where it may have any."""
     body = layout.kind == "submerged-body"
-    for pairs, units in (
-        (layout.inputs, _ACTUATOR_UNITS), (layout.prescribed, CHANNEL_UNITS), (layout.environment, _ENVIRONMENT_UNITS)
-    ):  # fmt: skip
+    for name, column in layout.inputs:
+        yield column, _si(layout.input_unit(name))
+    for pairs, units in ((layout.prescribed, CHANNEL_UNITS), (layout.environment, _ENVIRONMENT_UNITS)):
         for name, column in pairs:
-            yield column, si_unit(units[name]) if body else ""
+            yield column, _si(units[name]) if body else ""
     for channel in layout.channels:
-        yield channel, si_unit(CHANNEL_UNITS[channel]) if body else ""
+        yield channel, _si(CHANNEL_UNITS[channel]) if body else ""
+
+
+def _si(unit: str) -> str:
+    """`unit` as recordings state it; empty where it is not known."""
+    return (si_unit(unit) or "1") if unit else ""
 
 
 def _check(recording: Recording, column: str, stated: str, expected: str) -> None:
     if stated == expected:
         return
-    dimension, remedy = _DIMENSIONS[expected]
+    name = _NAMES.get(expected, expected)
+    dimension, remedy = _DIMENSIONS.get(expected, (f"quantity in {name}", expected))
     article = "an" if dimension[0] in "aeiou" else "a"
     what = f"{_NAMES.get(stated, stated)} is not the unit of {article} {dimension}"
     raise InputError(f"{recording.source}, column {column!r}", what, f"head it {column}[…] in {remedy}")

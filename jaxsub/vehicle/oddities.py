@@ -3,9 +3,10 @@ no rigid body has."""
 
 from collections.abc import Iterator
 
-from ..effects import EQUATIONS, GRAVITY, VELOCITIES, AbstractEffect, AbstractForce, derivative, options
+from ..effects import EQUATIONS, GRAVITY, VELOCITIES, AbstractForce, derivative
 from ..findings import Finding
 from .base import AbstractVehicle, Layout
+from .checks import inputs_of
 from .mechanism import Mechanism
 from .products import derivatives
 from .submerged_body import CURRENT, SubmergedBody
@@ -88,7 +89,7 @@ def _acts(name: str, layout: Layout) -> bool:
 
 
 def _idle(vehicle: AbstractVehicle, where: str) -> Iterator[Finding]:
-    layout, named = vehicle.layout, {word for effect in vehicle.effects for word in _words(effect)}
+    layout, named = vehicle.layout, {word for effect in vehicle.effects for word in inputs_of(effect)}
     for actuator, _ in layout.inputs:
         if actuator in named or (
             _drives(vehicle, actuator) if isinstance(vehicle, Mechanism) else _pushes(vehicle, actuator)
@@ -104,19 +105,18 @@ def _drives(vehicle: Mechanism, actuator: str) -> bool:
 
 
 def _pushes(vehicle: AbstractVehicle, actuator: str) -> bool:
+    if isinstance(vehicle, SubmergedBody) and _moves(vehicle, actuator):
+        return True
     if actuator == "thrust":
         return "surge" in vehicle.layout.equations
     acting = [term for name, term in derivatives(vehicle.own_values()).items() if _acts(name, vehicle.layout)]
     return any(actuator in way for term in acting for way in term.needs())
 
 
-def _words(effect: AbstractEffect) -> Iterator[str]:
-    """The names that an effect is told to act on or through."""
-    for value in options(effect).values():
-        if isinstance(value, str):
-            yield from (value, *value.split(","))
-        elif isinstance(value, tuple):
-            yield from value
+def _moves(body: SubmergedBody, name: str) -> bool:
+    """Whether an input commands an actuator that acts on a free degree of freedom."""
+    free = set(body.layout.equations)
+    return any(name in dict(item.input) and free & set(item.acts_on()) for item in body.actuators.items)
 
 
 def _couplings(mechanism: Mechanism, where: str) -> Iterator[Finding]:

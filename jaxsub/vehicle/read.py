@@ -7,6 +7,7 @@ from typing import Any
 
 from ..effects import (
     EQUATIONS,
+    INPUT_UNITS,
     AbstractEffect,
     SmoothForce,
     derivative,
@@ -17,17 +18,19 @@ from ..effects import (
 )
 from ..errors import InputError
 from ..parameters import Parameter
+from ..units import same_dimension
+from .actuators import read_actuators
 from .build import BODY_KEYS, VECTORS, build
 from .coefficient_units import coefficient_unit
 from .mechanism import Mechanism
 from .scales import check_scaled, read_scales
-from .schema import Table, read_number, read_option, read_outputs, read_pairs, unknown_key
+from .schema import Table, read_inputs, read_number, read_option, read_outputs, read_pairs, unknown_key
 from .submerged_body import CORIOLIS, SubmergedBody
 from .ties import Tie, read_tie
 from .toml import check_tree, read_toml
 
 _TOP = ("schema", "name", "kind", "dof", "coefficients", "inputs", "environment", "outputs", "effects")
-_OF_BODY = ("body", "model", "prescribed")
+_OF_BODY = ("body", "model", "prescribed", "actuators")
 _SIZES = {"length": "m", "diameter": "m", "reference_density": "kg/m^3"}
 _MOST_EFFECTS = 100
 
@@ -37,13 +40,16 @@ def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ())
 
     **Raises** `InputError` that names the file and the key for anything that is not as formats.md has it.
     """
-    return vehicle_from(read_toml(Path(path)), str(path), effects)
+    return vehicle_from(read_toml(Path(path)), str(path), effects, Path(path).parent)
 
 
 def vehicle_from(
-    data: dict[str, Any], where: str, effects: Sequence[type[AbstractEffect]] = ()
+    data: dict[str, Any], where: str, effects: Sequence[type[AbstractEffect]] = (), folder: Path | None = None
 ) -> SubmergedBody | Mechanism:
-    """The vehicle described by a parsed vehicle file; `where` names it in errors, `effects` are a user's own."""
+    """The vehicle described by a parsed vehicle file; `where` names it in errors, `effects` are a user's own.
+
+    `folder` holds the files that it names, the working directory where absent.
+    """
     check_tree(data, where)
     top = Table(data, where, "")
     if type(top.required("schema")) is not int or data["schema"] != 1:
@@ -57,9 +63,13 @@ def vehicle_from(
     body, extra = _read_body(top) if kind == "submerged-body" else ({}, {})
     if kind == "mechanism":
         top.required("dof")
-    numbers = dict(body)
-    coefficients, system, ties = _read_coefficients(top.table("coefficients"), kind == "submerged-body")
-    numbers |= coefficients
+    inputs, units = _read_inputs(top.table("inputs"), kind == "submerged-body")
+    names = tuple(name for name, _ in inputs)
+    devices = read_actuators(top.table("actuators"), names, units, folder or Path())
+    coefficients, system, ties = _read_coefficients(
+        top.table("coefficients"), kind == "submerged-body", devices.input_units
+    )
+    numbers = body | coefficients | devices.numbers
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
     built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
     return build(
@@ -71,13 +81,15 @@ def vehicle_from(
         hull=extra,
         coriolis=_read_model(top.table("model")),
         system=system,
-        ties=ties,
-        inputs=read_pairs(top.table("inputs")),
+        ties=(*ties, *devices.ties),
+        inputs=inputs,
+        input_units={name: unit for name, unit in devices.input_units.items() if name not in INPUT_UNITS},
+        actuators=devices.actuators,
         prescribed=read_pairs(top.table("prescribed")),
         environment=read_pairs(top.table("environment")),
         outputs=read_outputs(top.table("outputs")),
-        effects=built_in,
-        effect_rows=effect_rows,
+        effects=(*(effect for effect, _ in devices.stages), *built_in),
+        effect_rows=(*(row for _, row in devices.stages), *effect_rows),
     )
 
 
@@ -87,24 +99,39 @@ def _read_model(table: Table) -> str:
     return table.choice("coriolis", CORIOLIS) if "coriolis" in table.data else CORIOLIS[0]
 
 
-def _read_coefficients(table: Table, body: bool) -> tuple[dict[str, tuple[float, Parameter]], str, tuple[Tie, ...]]:
+def _read_inputs(table: Table, body: bool) -> tuple[tuple[tuple[str, str], ...], dict[str, str]]:
+    """The pairs of `[inputs]`, and the SI units of those for which that is known."""
+    pairs, stated = read_inputs(table)
+    known = {name: INPUT_UNITS[name] for name, _ in pairs if body and name in INPUT_UNITS}
+    for name, unit in known.items():
+        if not same_dimension(stated.get(name, unit), unit):
+            place = f"{table.place(name)}.unit"
+            raise InputError(place, f"is {stated[name]!r}, and {name} is in {unit}", f'write unit = "{unit}"')
+    return pairs, stated | known
+
+
+def _read_coefficients(
+    table: Table, body: bool, units: dict[str, str]
+) -> tuple[dict[str, tuple[float, Parameter]], str, tuple[Tie, ...]]:
     """The numbers of `[coefficients]` in SI, the system in which the file gives them in words, and its ties.
 
-    In a file with a `system` a number that states its `unit` is in SI all the same.
+    In a file with a `system` a number that states its `unit` is in SI all the same, and so is one by an input that has
+    no symbol. `units` has the units of such inputs.
     """
     scales = read_scales(table.table("system")) if body and "system" in table.data else None
     numbers, ties = {}, []
     for name, entry in table.items():
         if name == "system" and scales is not None:
             continue
-        place, unit = table.place(name), coefficient_unit(name) if body else ""
+        place, unit = table.place(name), coefficient_unit(name, units) if body else ""
         if isinstance(entry, str):
             ties.append(read_tie(name, entry, place))
             numbers[name] = 0.0, Parameter(name, unit, free=False)
             continue
         number = read_number(entry, place, Parameter(name, unit))
         stated = isinstance(entry, dict) and "unit" in entry
-        if scales is not None and not stated and (term := derivative(name)) is not None:
+        term = derivative(name)
+        if scales is not None and not stated and term is not None and term.dimensional:
             number = scales.si(term, *number)
             check_scaled(number[0], place)
         numbers[name] = number

@@ -97,7 +97,7 @@ def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Para
             raise unknown_key(f"{place}.{key}", _NUMBER_KEYS, key)
     if "value" not in table.data:
         raise InputError(place, "has no value", "write { value = … }")
-    value = _finite(table.data["value"], place)
+    value = read_finite(table.data["value"], place)
     low, high = _bounds(table.data.get("bounds", [default.lower, default.upper]), place)
     if not low <= value <= high:
         raise InputError(place, f"value {value:g} lies outside its bounds [{low:g}, {high:g}]", "mend one of them")
@@ -111,7 +111,7 @@ def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Para
     if "prior_mean" in table.data:
         if not math.isfinite(row.prior_std):
             raise InputError(f"{place}.prior_mean", "is given without prior_std", "add prior_std = …")
-        row = dataclasses.replace(row, prior_mean=_finite(table.data["prior_mean"], f"{place}.prior_mean"))
+        row = dataclasses.replace(row, prior_mean=read_finite(table.data["prior_mean"], f"{place}.prior_mean"))
     return value, dataclasses.replace(row, unit=_unit(table, place, default.unit))
 
 
@@ -131,18 +131,24 @@ def _unit(table: Table, place: str, expected: str) -> str:
     """The unit of a number, refused where its `table` states one that is not `expected` or not SI."""
     if "unit" not in table.data:
         return expected
-    stated, place = table.data["unit"], f"{place}.unit"
+    place = f"{place}.unit"
+    stated = read_unit(table.data["unit"], place, f"give the number in {expected}" if expected else "")
+    if expected and not same_dimension(stated, expected):
+        raise InputError(place, f"is {stated!r}, and the number is in {expected}", f'write unit = "{expected}"')
+    return expected or stated
+
+
+def read_unit(stated: Any, place: str, remedy: str = "") -> str:
+    """An SI unit as text; `remedy` is what to do about one that is not SI."""
     if not isinstance(stated, str):
         raise InputError(place, f"{stated!r:.60} is not a word", 'write unit = "N" and the like')
     try:
         if not is_si(stated):
-            remedy = f"give the number in {expected or si_unit(stated) or '1'}"
-            raise InputError(place, f"is {stated!r}, and numbers of a vehicle file are in SI", remedy)
-        if expected and not same_dimension(stated, expected):
-            raise InputError(place, f"is {stated!r}, and the number is in {expected}", f'write unit = "{expected}"')
+            what = f"is {stated!r}, and numbers of a vehicle file are in SI"
+            raise InputError(place, what, remedy or f"give the number in {si_unit(stated) or '1'}")
     except UnknownUnit as error:
         raise InputError(place, str(error), error.remedy) from error
-    return expected or stated
+    return stated
 
 
 def read_option(table: Table, key: str, field: dataclasses.Field) -> Any:
@@ -152,12 +158,13 @@ def read_option(table: Table, key: str, field: dataclasses.Field) -> Any:
     value, form = table.required(key), field.type
     if form is str and not isinstance(value, str):
         raise InputError(table.place(key), f"{value!r:.60} is not a word", f'write {key} = "…"')
-    if form is float and not (value := _finite(value, table.place(key))) > 0.0 and "signed" not in field.metadata:
+    if form is float and not (value := read_finite(value, table.place(key))) > 0.0 and "signed" not in field.metadata:
         raise InputError(table.place(key), f"is {value:g}", "give a positive number")
     return value if form in (str, float) else table.names(key)
 
 
-def _finite(value: Any, place: str) -> float:
+def read_finite(value: Any, place: str) -> float:
+    """A plain number of a size that can be computed with."""
     if not math.isfinite(number := _real(value)):
         raise InputError(place, f"{value!r:.60} is not a finite number", "give a number in SI units")
     if not computable(number):
@@ -173,7 +180,7 @@ def computable(size: float) -> bool:
 
 def read_positive(value: Any, place: str) -> float:
     """A plain number above zero."""
-    if (size := _finite(value, place)) <= 0.0:
+    if (size := read_finite(value, place)) <= 0.0:
         raise InputError(place, f"is {size:g}", "give a positive number")
     return size
 
@@ -196,13 +203,30 @@ def _bounds(value: Any, place: str) -> tuple[float, float]:
 
 
 def read_pairs(table: Table) -> tuple[tuple[str, str], ...]:
-    """(name in the model, column of the recording) pairs of `[inputs]` and its like."""
-    for key, column in table.items():
-        if not isinstance(column, str) or not column.strip():
-            raise InputError(table.place(key), f"{column!r:.60} is not a column name", f'write {key} = "column"')
-        if re.search(r"[\[\]]", column):
-            raise InputError(table.place(key), f"{column!r} has brackets", "name the column without its unit")
-    return tuple(table.items())
+    """(name in the model, column of the recording) pairs of `[prescribed]` and `[environment]`."""
+    return tuple((key, _column(column, table.place(key), key)) for key, column in table.items())
+
+
+def read_inputs(table: Table) -> tuple[tuple[tuple[str, str], ...], dict[str, str]]:
+    """The pairs of `[inputs]`, and the SI units of those that state one: `name = { column = "c", unit = "V" }`."""
+    pairs, units = [], {}
+    for name, entry in table.items():
+        if isinstance(entry, dict):
+            own = table.table(name)
+            own.only(("column", "unit"))
+            if "unit" in own.data:
+                units[name] = read_unit(own.data["unit"], own.place("unit"))
+            entry = own.required("column")
+        pairs.append((name, _column(entry, table.place(name), name)))
+    return tuple(pairs), units
+
+
+def _column(column: Any, place: str, key: str) -> str:
+    if not isinstance(column, str) or not column.strip():
+        raise InputError(place, f"{column!r:.60} is not a column name", f'write {key} = "column"')
+    if re.search(r"[\[\]]", column):
+        raise InputError(place, f"{column!r} has brackets", "name the column without its unit")
+    return column
 
 
 def read_outputs(table: Table) -> tuple[Output, ...]:
@@ -213,7 +237,7 @@ def read_outputs(table: Table) -> tuple[Output, ...]:
         entry.only(("sigma", "lever_arm"))
         sigma = entry.data.get("sigma", "estimate")
         if sigma != "estimate":
-            sigma = _finite(sigma, entry.place("sigma"))
+            sigma = read_finite(sigma, entry.place("sigma"))
             if sigma <= 0.0:
                 raise InputError(entry.place("sigma"), f"is {sigma:g}", 'give a positive number or "estimate"')
         arm = entry.data.get("lever_arm", [0.0, 0.0, 0.0])
@@ -222,7 +246,7 @@ def read_outputs(table: Table) -> tuple[Output, ...]:
             raise InputError(entry.place("lever_arm"), f"{channel} does not use it", remedy)
         if not isinstance(arm, list) or len(arm) != 3:
             raise InputError(entry.place("lever_arm"), f"is {arm!r:.60}", "give three numbers in m")
-        x, y, z = (_finite(item, entry.place("lever_arm")) for item in arm)
+        x, y, z = (read_finite(item, entry.place("lever_arm")) for item in arm)
         outputs.append(Output(channel, None if sigma == "estimate" else sigma, (x, y, z)))
     if not outputs:
         raise InputError(f"{table.where}: outputs", "names no measured channel", "add [outputs.r] and the like")

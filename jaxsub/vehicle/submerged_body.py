@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from ..arrays import Values
 from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal, coriolis, stream
 from ..parameters import number
+from .actuators import Actuators
 from .base import AbstractVehicle, Layout, timed
 from .damping import Damping
 from .inertia import Inertia, sparse
@@ -40,6 +41,7 @@ class SubmergedBody(AbstractVehicle):
 
     - `inertia`, `damping`, `products`, `restoring`: of rigid body and added mass, of linear damping, of all other
       derivatives, of weight and buoyancy.
+    - `actuators`: what pushes, lifts and weighs by a command, beside the derivatives by inputs.
     - `cruise`: operating speed U_c, m/s.
     - `coriolis`: `linear` about the operating speed, where added mass has its share in the linear derivatives; `full`
       for rigid body and added mass; `rigid-body` where derivatives such as `X_wq` hold what is the added mass's.
@@ -53,6 +55,7 @@ class SubmergedBody(AbstractVehicle):
     layout: Layout = eqx.field(static=True)
     effects: tuple[AbstractEffect, ...] = ()
     coriolis: str = eqx.field(static=True, default="linear")
+    actuators: Actuators = eqx.field(default_factory=Actuators)
 
     def mass_matrix(self) -> Float[Values, "n n"]:
         """Inertia of the free equations."""
@@ -65,9 +68,8 @@ class SubmergedBody(AbstractVehicle):
     def own_values(self) -> dict[str, Array]:
         """Body data and coefficients."""
         parts = (self.inertia.rigid, self.inertia.added, self.damping.coefficients, self.products.coefficients)
-        return {name: v for part in (*parts, self.restoring.values) for name, v in part.items()} | {
-            "speed": self.cruise
-        }
+        parts = (*parts, self.restoring.values, self.actuators.values(), {"speed": self.cruise})
+        return {name: value for part in parts for name, value in part.items()}
 
     def with_own_values(self, values: Mapping[str, Values]) -> Self:
         """The same body with other numbers for those named."""
@@ -82,6 +84,7 @@ class SubmergedBody(AbstractVehicle):
             products=Products(update(self.products.coefficients)),
             restoring=dataclasses.replace(self.restoring, values=update(self.restoring.values)),
             cruise=number(values.get("speed", self.cruise)),
+            actuators=self.actuators.with_values(values),
         )
 
     def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:
@@ -100,8 +103,9 @@ class SubmergedBody(AbstractVehicle):
         buoyancy = self.restoring.buoyancy(environment)
         positions = {name: known.get(name, zero) for name in (*_POSITIONS, *self.layout.positions)}
         inertia, damping = self.inertia.matrix(), self._damping()
-        if slopes := self.products.slopes(self.cruise):
-            places = [(EQUATIONS.index(row), EQUATIONS.index(column), value) for row, column, value in slopes]
+        slopes = self.products.slopes(self.cruise)
+        places = [(EQUATIONS.index(row), EQUATIONS.index(column), value) for row, column, value in slopes]
+        if places := [*places, *self.actuators.damping(self.cruise)]:
             damping = damping + sparse(places)
         water: dict[str, Signal] = dict(zip(EQUATIONS, _water(positions, environment, zero), strict=False))
         return Motion(
@@ -109,8 +113,10 @@ class SubmergedBody(AbstractVehicle):
         )
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
-        """Products, restoring, Coriolis, what a current adds, and the damping of prescribed velocities."""
+        """Products, actuators, restoring, Coriolis, what a current adds, and the damping of prescribed velocities."""
         total = self.products.force(motion)
+        for equation, part in self.actuators.force(motion).items():
+            total[equation] = total.get(equation, 0.0) + part
         restoring = self.restoring.force(
             motion.positions["phi"], motion.positions["theta"], jnp.asarray(motion.buoyancy)
         )
@@ -130,15 +136,16 @@ class SubmergedBody(AbstractVehicle):
 
     @property
     def has(self) -> frozenset[str]:
-        """Its derivatives, by symbol, and `coriolis` where that is not linear."""
+        """Its derivatives, by symbol, those of its actuators, and `coriolis` where that is not linear."""
         names = (*self.inertia.added, *self.damping.coefficients, *self.products.coefficients)
         turning = () if self.coriolis == "linear" else ("coriolis",)
-        return frozenset((*(term.name for term in derivatives(names).values()), *turning))
+        return frozenset((*(term.name for term in derivatives(names).values()), *self.actuators.names, *turning))
 
     @property
-    def nonlinear(self) -> tuple[Products, ...]:
-        """The products, if any follows a velocity."""
-        return (self.products,) if self.products.damp else ()
+    def nonlinear(self) -> tuple[Products | Actuators, ...]:
+        """The products and the actuators, where any follows a velocity."""
+        moved = any(item.follows for item in self.actuators.items)
+        return (*((self.products,) if self.products.damp else ()), *((self.actuators,) if moved else ()))
 
     def own_position_rates(self, motion: Motion) -> dict[str, Signal]:
         """Euler rates and velocity over ground."""

@@ -12,7 +12,7 @@ from ..effects import derivative
 from ..errors import InputError, nearest
 
 # a symbol such as Y_v|v|, or a number such as 2.5e-3, whose exponent is no symbol
-_NAME = re.compile(r"(?<![\w.])[A-Za-z_][\w|]*")
+_NAME = re.compile(r"(?<![\w.])[A-Za-z_][\w|]*(?:\.[A-Za-z_]\w*)?")
 _MOST = 200  # characters
 _UNITS = (2.0, 3.0, 5.0)  # of mass, length and time, in which dimensions are compared
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -69,7 +69,7 @@ def tied_values(ties: tuple[Tie, ...], values: Mapping[str, float], where: str) 
     """
     found, tied = {}, {tie.name for tie in ties}
     for tie in ties:
-        place = f"{where}: coefficients.{tie.name}"
+        place = f"{where}: {'actuators' if '.' in tie.name else 'coefficients'}.{tie.name}"
         for name in tie.names:
             if name in tied:
                 raise InputError(place, f"follows {name}, which follows others", "write it in terms of those")
@@ -92,7 +92,7 @@ def _check_dimension(tie: Tie, place: str) -> None:
     """Refuse an expression of derivatives alone whose dimension is another; a number in it may have any dimension."""
     terms = {name: derivative(name) for name in (tie.name, *tie.names)}
     numbers = any(isinstance(part, ast.Constant) for part in ast.walk(_parsed(tie.text, tie.names)))
-    if numbers or None in terms.values():
+    if numbers or any(term is None or not term.dimensional for term in terms.values()):
         return
     # in other units of mass, length and time the expression has to change as the number does
     change = {

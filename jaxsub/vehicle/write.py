@@ -10,7 +10,8 @@ from ..effects import AbstractEffect, options, parameter_table
 from ..errors import OutputError
 from ..parameters import Parameter
 from ..storage import written_whole
-from .base import AbstractVehicle
+from .actuators import Actuators, actuator_tables
+from .base import AbstractVehicle, Layout
 from .build import BODY_KEYS, VECTORS
 from .submerged_body import CORIOLIS, SubmergedBody
 
@@ -42,7 +43,8 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
         if vehicle.coriolis != CORIOLIS[0]:
             document["model"] = {"coriolis": vehicle.coriolis}
     coefficients, tied = tomlkit.table(), {tie.name: tie.text for tie in layout.ties}
-    for name in own:
+    devices = vehicle.actuators if isinstance(vehicle, SubmergedBody) else Actuators()
+    for name in (name for name in own if name not in devices.values()):
         if name in tied:
             coefficients[name] = tied[name]
         elif not isinstance(vehicle, SubmergedBody) or name not in _body_names():
@@ -50,9 +52,12 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
             unit = "" if isinstance(vehicle, SubmergedBody) else row.unit
             coefficients[name] = _number_table(own[name], row, Parameter(name), unit)
     document["coefficients"] = coefficients
-    for section, pairs in (
-        ("inputs", layout.inputs), ("prescribed", layout.prescribed), ("environment", layout.environment)
-    ):  # fmt: skip
+    if layout.inputs:
+        document["inputs"] = {name: _input(column, layout, name) for name, column in layout.inputs}
+    tables, stages = actuator_tables(devices, vehicle.effects, rows, tied, _number_table)
+    if devices.items:
+        document["actuators"] = tables
+    for section, pairs in (("prescribed", layout.prescribed), ("environment", layout.environment)):
         if pairs:
             document[section] = dict(pairs)
     outputs = tomlkit.table()
@@ -61,11 +66,21 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
         if any(output.lever_arm):
             outputs[output.channel]["lever_arm"] = list(output.lever_arm)
     document["outputs"] = outputs
-    if vehicle.effects:
+    effects = [effect for effect in vehicle.effects if not any(effect is stage for stage in stages)]
+    if effects:
         document["effects"] = tomlkit.aot()
-    for effect in vehicle.effects:
+    for effect in effects:
         document["effects"].append(_effect_table(effect, rows))
     return tomlkit.dumps(document)
+
+
+def _input(column: str, layout: Layout, name: str) -> Any:
+    """The column of an input, with the unit of one that has no symbol."""
+    if not (unit := dict(layout.input_units).get(name)):
+        return column
+    table = tomlkit.inline_table()
+    table["column"], table["unit"] = column, unit
+    return table
 
 
 def _body_names() -> set[str]:

@@ -94,7 +94,7 @@ REFUSED = {
     "itself": ("-K_delta_el", "follows K_delta_el, which follows others", "in terms of those"),
     "call": ("abs(K_p)", "is no expression", "+ - * / **"),
     "open": ("-(K_p", "is no expression", "+ - * / **"),
-    "attribute": ("K_p.real", "is no expression", "+ - * / **"),
+    "attribute": ("K_p.real", "follows K_p.real, which is no number of the vehicle", "known: "),
     "infinite": ("K_p / (N_v + 5)", "has no finite value", "mend"),
     "root": ("K_p ** 0.5", "has no finite value", "mend"),
     "huge": ("9**9**9**K_delta_er", "has no finite value", "mend"),

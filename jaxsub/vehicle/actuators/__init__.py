@@ -1,0 +1,7 @@
+"""Actuators of a body: thrusters, propellers, fins, rudders, ballast."""
+
+from .base import Actuator, Actuators
+from .read import KINDS, read_actuators
+from .write import actuator_tables
+
+__all__ = ["KINDS", "Actuator", "Actuators", "actuator_tables", "read_actuators"]
