@@ -5,6 +5,7 @@ import functools
 import re
 from collections.abc import Iterable, Sequence
 
+from ..arrays import namespace
 from .motion import EQUATIONS, FORCES, VELOCITIES, Motion, Signal, unit_per
 
 INPUT_SYMBOLS = {
@@ -17,8 +18,10 @@ INPUT_SYMBOLS = {
     "shaft_speed": "n",
 }
 INPUT_UNITS: dict[str, str] = dict.fromkeys(INPUT_SYMBOLS, "rad") | {"thrust": "N", "shaft_speed": "rad/s"}
+_SPEED = "speed"
 # as `Y_v|v|`, `N_u_delta_r`: factors follow each other, or stand apart by an underscore
 _SYMBOLS = {v: e for e, v in VELOCITIES.items()} | {symbol: name for name, symbol in INPUT_SYMBOLS.items()}
+_SYMBOLS["U"] = _SPEED
 _FACTOR = "|".join(sorted(_SYMBOLS, key=len, reverse=True))
 _TOKEN = re.compile(rf"_?(?:\|({_FACTOR})\||({_FACTOR}))")
 _RATE = re.compile(r"[uvwpqr]dot")
@@ -28,7 +31,7 @@ _HIGHEST = 6  # of the sum of powers: Taylor series of the field end at the thir
 # of velocities and inputs: exponents of mass, length and time
 _FORCE = (1, 1, -2)
 _DIMENSIONS: dict[str, tuple[int, int, int]] = {
-    **dict.fromkeys(EQUATIONS[:3], (0, 1, -1)),
+    **dict.fromkeys((*EQUATIONS[:3], _SPEED), (0, 1, -1)),
     **dict.fromkeys((*EQUATIONS[3:], "shaft_speed"), (0, 0, -1)),
     "thrust": _FORCE,
 }
@@ -40,7 +43,7 @@ class Power:
 
     **Fields**
 
-    - `variable`: an equation of motion (its velocity) or an actuator. `power`: k.
+    - `variable`: an equation of motion (its velocity), an actuator, or `speed`. `power`: k, below zero of speed alone.
     - `odd`: whether the factor changes its sign with the variable's.
     """
 
@@ -67,7 +70,8 @@ class Derivative:
     r"""A force that is proportional to a product: $\tau_i = c\,x_1^{k_1} x_2^{k_2} \cdots$, or to an acceleration.
 
     A coefficient of a vehicle file is one by its name (`derivative`), and so is an effect whose only number is such a
-    coefficient; both get the product, its unit and its dimension from here. Velocities are those through the water.
+    coefficient; both get the product, its unit and its dimension from here. Velocities are those through the water,
+    and so is the speed $U = \sqrt{u^2 + v^2 + w^2}$, by which a product may also be divided.
 
     **Fields**
 
@@ -86,18 +90,25 @@ class Derivative:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Equations and actuators in the product, each as often as its power."""
+        """Equations, actuators and speed in the product, each as often as its power."""
         return tuple(power.variable for power in self.powers for _ in range(power.power))
 
     @property
+    def inputs(self) -> tuple[str, ...]:
+        """The actuators in the product, each as often as its power."""
+        return tuple(variable for variable in self.variables if variable not in (*EQUATIONS, _SPEED))
+
+    @property
     def moved(self) -> tuple[str, ...]:
-        """The equations whose velocities are in the product."""
-        return tuple(power.variable for power in self.powers if power.variable in EQUATIONS)
+        """The equations whose velocities are in the product; surge where the speed is."""
+        own = (EQUATIONS[0] if power.variable == _SPEED else power.variable for power in self.powers)
+        return tuple(dict.fromkeys(variable for variable in own if variable in EQUATIONS))
 
     @property
     def linear(self) -> bool:
         """Whether it is linear damping: proportional to one velocity."""
-        return not self.rate and len(self.variables) == 1 and self.powers[0].odd and bool(self.moved)
+        single = not self.rate and len(self.powers) == 1 and self.powers[0].power == 1 and self.powers[0].odd
+        return single and self.powers[0].variable in EQUATIONS
 
     @property
     def sign(self) -> int:
@@ -109,13 +120,14 @@ class Derivative:
         """Its symbol in a vehicle file, such as `K_p|p|`; by an input without a symbol alone, `B_yaw_bow_thruster`."""
         if not self.dimensional and self.powers == (Power(self.variables[0]),):
             return f"B_{self.equation}_{self.variables[0]}"
-        written = "_".join(_joined(self.powers)) or "0"
-        return f"{FORCES[self.equation]}_{written}{'dot' if self.rate else ''}"
+        written = "_".join(_joined([power for power in self.powers if power.power > 0])) or "0"
+        below = "".join(f"/{'U' * -power.power}" for power in self.powers if power.power < 0)
+        return f"{FORCES[self.equation]}_{written}{'dot' if self.rate else ''}{below}"
 
     @property
     def dimensional(self) -> bool:
         """Whether the dimension of every factor is known, as that of an input without a symbol is not."""
-        return all(variable in EQUATIONS or variable in INPUT_SYMBOLS for variable in self.variables)
+        return all(variable in INPUT_SYMBOLS for variable in self.inputs)
 
     @property
     def unit(self) -> str:
@@ -124,29 +136,31 @@ class Derivative:
             return ""
         if self.rate:
             return ("kg", "kg*m", "kg*m^2")[sum(e in EQUATIONS[3:] for e in (self.equation, *self.variables))]
-        return unit_per(self.equation, *self.variables)
+        below = sum(-power.power for power in self.powers if power.power < 0)
+        return unit_per(self.equation, *self.variables) + below * "*(m/s)"
 
     @property
     def dimension(self) -> tuple[int, int, int]:
         """The exponents of mass, length and time, where the derivative is `dimensional`."""
         lever = (0, 1, 0) if self.equation in EQUATIONS[3:] else (0, 0, 0)
         total = [a + b for a, b in zip(_FORCE, lever, strict=True)]
-        for variable in self.variables:
-            total = [a - b for a, b in zip(total, _DIMENSIONS.get(variable, (0, 0, 0)), strict=True)]
+        for power in self.powers:
+            own = _DIMENSIONS.get(power.variable, (0, 0, 0))
+            total = [a - power.power * b for a, b in zip(total, own, strict=True)]
         mass, length, time = total
         return mass, length, time + self.rate
 
     @property
     def expression(self) -> str:
         """The product, as a person would write it: `|p| p`, `v r`, `rudder T`."""
-        own = VELOCITIES | {"thrust": "T", "shaft_speed": "n"}
+        own = VELOCITIES | {"thrust": "T", "shaft_speed": "n", _SPEED: "U"}
         if self.equation not in EQUATIONS:
             own[self.equation] = f"{self.equation}'"
         return " ".join(_raised(own.get(power.variable, power.variable), power) for power in self.powers)
 
     def needs(self) -> tuple[tuple[str, ...], ...]:
         """The sets of actuators, any one of which the product can be taken from; empty where it has none."""
-        own = tuple(power.variable for power in self.powers if power.variable not in EQUATIONS)
+        own = tuple(dict.fromkeys(self.inputs))
         if "elevator" in own:
             rest = tuple(name for name in own if name != "elevator")
             return (own, (*rest, "elevator_right", "elevator_left"))
@@ -164,6 +178,10 @@ class Derivative:
 def _value(variable: str, motion: Motion) -> Signal:
     if variable in motion.rates:
         return motion.flow[variable]
+    if variable == _SPEED:
+        u, v, w = (motion.flow[e] for e in EQUATIONS[:3])
+        # which has a slope at rest too
+        return namespace(u, v, w).sqrt(u**2 + v**2 + w**2 + 1e-12)
     if variable == "elevator" and variable not in motion.actuators:
         return 0.5 * (motion.actuators["elevator_right"] + motion.actuators["elevator_left"])
     return motion.actuators[variable]
@@ -173,17 +191,20 @@ def _value(variable: str, motion: Motion) -> Signal:
 def derivative(name: str) -> Derivative | None:
     """The derivative of the symbol `name`, such as `N_vvr` or `Z_w|w|`; None for what is no such symbol.
 
-    `X_nn` is $X_{nn}|n|n$, as the field has it. `B_yaw_bow_thruster` is the moment by any input of that name.
+    `X_nn` is $X_{nn}|n|n$, as the field has it. U is the speed, and `"Y_vvv/U"` a product divided by it.
+    `B_yaw_bow_thruster` is the moment by any input of that name.
     """
     if by_name := _BY_NAME.fullmatch(name):
         return Derivative(by_name[1], (Power(by_name[2]),))
     equation = {letter: e for e, letter in FORCES.items()}.get(name[:1])
-    symbol = name[2:]
+    symbol, slash, below = name[2:].partition("/")
+    if slash and not re.fullmatch(r"U+", below):
+        return None
     if equation is None or name[1:2] != "_" or len(name) > 60:
         return None
-    if symbol == "0":
+    if symbol == "0" and not slash:
         return Derivative(equation)
-    if _RATE.fullmatch(symbol):
+    if not slash and _RATE.fullmatch(symbol):
         return Derivative(equation, (Power(_SYMBOLS[symbol[0]]),), rate=True)
     factors, at = [], 0
     while at < len(symbol):
@@ -191,12 +212,12 @@ def derivative(name: str) -> Derivative | None:
             return None
         factors.append((_SYMBOLS[token[1] or token[2]], bool(token[1])))
         at = token.end()
-    if not factors or len(factors) > _HIGHEST:
+    if not factors or len(factors) + len(below) > _HIGHEST:
         return None
     if [factor for factor in factors if factor[0] == "shaft_speed"] == [("shaft_speed", False)] * 2:
         # a propeller that turns backwards pushes backwards
         factors[factors.index(("shaft_speed", False))] = ("shaft_speed", True)
-    return Derivative(equation, _gathered(factors))
+    return Derivative(equation, _gathered(factors, len(below)))
 
 
 def alike(names: Iterable[str]) -> tuple[str, str] | None:
@@ -208,12 +229,17 @@ def alike(names: Iterable[str]) -> tuple[str, str] | None:
     return None
 
 
-def _gathered(factors: Sequence[tuple[str, bool]]) -> tuple[Power, ...]:
-    """Factors, each a variable and whether it is absolute, as powers in the order of the field."""
-    order = [*EQUATIONS, *INPUT_SYMBOLS]
-    variables = sorted({name for name, _ in factors}, key=lambda n: (order.index(n) if n in order else len(order), n))
+def _gathered(factors: Sequence[tuple[str, bool]], below: int = 0) -> tuple[Power, ...]:
+    """Factors, each a variable and whether it is absolute, over that power of speed, in the order of the field."""
+    order = [_SPEED, *EQUATIONS, *INPUT_SYMBOLS]
+    named = {name for name, _ in factors} | ({_SPEED} if below else set())
+    variables = sorted(named, key=lambda n: (order.index(n) if n in order else len(order), n))
     powers = []
     for variable in variables:
+        if variable == _SPEED:
+            if count := sum(name == _SPEED for name, _ in factors) - below:
+                powers.append(Power(_SPEED, count, bool(count % 2)))
+            continue
         own = [absolute for name, absolute in factors if name == variable]
         powers.append(Power(variable, len(own), (len(own) - sum(own)) % 2 == 1))
     return tuple(powers)
@@ -223,7 +249,8 @@ def _joined(powers: Sequence[Power]) -> list[str]:
     """The symbols of powers in groups that an underscore has to keep apart: `uu` and `delta_r`."""
     groups: list[str] = []
     for power in powers:
-        symbol = VELOCITIES.get(power.variable, INPUT_SYMBOLS.get(power.variable, power.variable))
+        symbol = "U" if power.variable == _SPEED else VELOCITIES.get(power.variable, "")
+        symbol = symbol or INPUT_SYMBOLS.get(power.variable, power.variable)
         text = _symbols(power, symbol)
         if groups and power.variable in EQUATIONS:
             groups[-1] += text

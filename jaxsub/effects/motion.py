@@ -28,7 +28,8 @@ def unit_per(equation: str, *variables: str) -> str:
     """The unit of a coefficient that makes a force of `equation` from a product of variables."""
     lines, angles = EQUATIONS[:3], EQUATIONS[3:]
     force = "N" if equation in lines else "N*m"
-    known = dict.fromkeys(lines, "(m/s)") | dict.fromkeys((*angles, "shaft_speed"), "(rad/s)") | {"thrust": "N"}
+    known: dict[str, str] = dict.fromkeys((*lines, "speed"), "(m/s)") | {"thrust": "N"}
+    known |= dict.fromkeys((*angles, "shaft_speed"), "(rad/s)")
     units = [known.get(variable, "rad") for variable in variables]
     return "/".join([force, *units]) if equation in EQUATIONS else "1"
 

@@ -114,9 +114,17 @@ def remus_100() -> SubmergedBody:
 
 def remus_100_nonlinear() -> SubmergedBody:
     """REMUS 100 with the nonlinear derivatives of Prestero (2001), all six degrees of freedom: a vehicle file."""
-    vehicle = read_vehicle(Path(__file__).parent / "published" / "remus_100.toml")
-    assert isinstance(vehicle, SubmergedBody)
-    return vehicle
+    return _published("remus_100")
+
+
+def bluerov2_heavy() -> SubmergedBody:
+    """BlueROV2 Heavy of von Benzon et al. (2022), six degrees of freedom and eight thrusters: a vehicle file."""
+    return _published("bluerov2_heavy")
+
+
+def kvlcc2() -> SubmergedBody:
+    """The KVLCC2 tanker's 7 m model by the MMG method of Yasukawa and Yoshimura (2015): a vehicle file."""
+    return _published("kvlcc2")
 
 
 def dsrv() -> SubmergedBody:
@@ -145,6 +153,12 @@ def dsrv() -> SubmergedBody:
         "inputs": {"stern_plane": "delta_s"},
         "outputs": {name: _NOISE[name] for name in ("w", "q", "theta", "z")},
     })  # fmt: skip
+
+
+def _published(name: str) -> SubmergedBody:
+    vehicle = read_vehicle(Path(__file__).parent / "published" / f"{name}.toml")
+    assert isinstance(vehicle, SubmergedBody)
+    return vehicle
 
 
 def _submerged_body(data: dict[str, Any]) -> SubmergedBody:

@@ -31,8 +31,8 @@ from .submerged_body import CURRENT, SubmergedBody
 MOST_COORDINATES = 30
 ENVIRONMENT = ("density", "ballast", "temperature", "altitude", *CURRENT)
 GRAMMAR = (
-    "a force X Y Z K M N, then _ and 0, a rate such as vdot, or a product of u v w p q r, n, T, delta_r, delta_e, "
-    "delta_er, delta_el and delta_s, each also as |v|; or B_yaw_NAME of any input NAME"
+    "a force X Y Z K M N, then _ and 0, a rate such as vdot, or a product of u v w p q r, U, n, T, delta_r, delta_e, "
+    "delta_er, delta_el and delta_s, each also as |v|, over /U; or B_yaw_NAME of any input NAME"
 )
 
 
@@ -82,7 +82,7 @@ def check_inputs(layout: Layout, parts: Iterable[Actuator | AbstractEffect | Der
 def inputs_of(part: Actuator | AbstractEffect | Derivative | None) -> Iterator[str]:
     """The inputs that an actuator or a coefficient acts through, and the names that an effect is told."""
     if isinstance(part, Derivative):
-        yield from part.variables
+        yield from part.inputs
     elif isinstance(part, Actuator):
         yield from dict(part.input)
     elif part is not None:

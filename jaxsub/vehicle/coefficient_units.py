@@ -19,6 +19,6 @@ def coefficient_unit(name: str, inputs: Mapping[str, str] | None = None) -> str:
         return _BODY.get(name, "")
     if term.dimensional:
         return term.unit
-    (variable,) = term.variables
+    (variable,) = term.inputs
     unit, force = (inputs or {}).get(variable, ""), unit_per(term.equation)
     return f"{force}/({unit})" if unit else ""

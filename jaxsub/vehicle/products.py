@@ -44,19 +44,27 @@ class Products(eqx.Module):
         """Equation, equation of the velocity, and slope of each force that the velocity has at the speed `cruise`."""
         found = []
         for name, term in derivatives(self.coefficients).items():
-            ahead = next((power for power in term.powers if power.variable == "surge"), None)
-            others = [power for power in term.powers if power is not ahead]
-            scale = self.coefficients[name] * term.sign
-            if not others and ahead is not None:
-                found.append((term.equation, "surge", scale * ahead.power * abs(cruise) ** (ahead.power - 1)))
+            ahead = [power for power in term.powers if power.variable in ("surge", "speed")]
+            others = [power for power in term.powers if power not in ahead]
+            scale, count = self.coefficients[name] * term.sign, sum(power.power for power in ahead)
+            if not others and ahead:
+                found.append((term.equation, "surge", scale * count * abs(cruise) ** (count - 1)))
             elif len(others) == 1 and others[0].variable in EQUATIONS and others[0] == Power(others[0].variable):
-                found.append((term.equation, others[0].variable, scale * (ahead.of(cruise) if ahead else 1.0)))
+                found.append((term.equation, others[0].variable, _at(ahead, cruise, scale)))
         return found
 
     @property
     def damp(self) -> bool:
         """Whether any of them follows a velocity."""
         return any(term.moved for term in derivatives(self.coefficients).values())
+
+
+def _at(powers: Iterable[Power], cruise: Signal, scale: Signal) -> Signal:
+    """`scale` times the powers of surge and speed at the speed `cruise`."""
+    for power in powers:
+        speed = abs(cruise) + 1e-6 * (power.power < 0) if power.variable == "speed" else cruise
+        scale = scale * power.of(speed)
+    return scale
 
 
 def derivatives(names: Iterable[str]) -> dict[str, Derivative]:

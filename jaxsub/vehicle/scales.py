@@ -11,6 +11,7 @@ from .schema import Table, computable, read_positive
 # what each system is stated by, with SI units
 _SYSTEMS = {
     "prime": {"length": "m", "density": "kg/m³", "speed": "m/s"},
+    "mmg": {"length": "m", "draught": "m", "density": "kg/m³", "speed": "m/s"},
     "bis": {"length": "m", "mass": "kg"},
 }
 
@@ -19,7 +20,8 @@ _SYSTEMS = {
 class Scales:
     r"""The units of mass (kg), length (m) and time (s) of a system; a derivative has theirs by its dimension.
 
-    Of `prime` (SNAME 1950) they are $\tfrac12\rho L^3$, L and L/U; of `bis` (Norrbin 1970) m, L and $\sqrt{L/g}$. So
+    Of `prime` (SNAME 1950) they are $\tfrac12\rho L^3$, L and L/U; of `mmg` (Yasukawa and Yoshimura 2015)
+    $\tfrac12\rho L^2d$, L and L/U; of `bis` (Norrbin 1970) m, L and $\sqrt{L/g}$. So of the first
     $Y_v' = Y_v/(\tfrac12\rho L^2U)$ and $Y_{uv}' = Y_{uv}/(\tfrac12\rho L^2)$. `text` says it in words.
     """
 
@@ -48,7 +50,7 @@ def read_scales(table: Table) -> Scales:
     text = f"{name} system ({', '.join(f'{key} {sizes[key]:g} {unit}' for key, unit in units.items())})"
     if name == "bis":
         return Scales(sizes["mass"], sizes["length"], math.sqrt(sizes["length"] / GRAVITY), text)
-    mass = 0.5 * sizes["density"] * sizes["length"] ** 3
+    mass = 0.5 * sizes["density"] * sizes["length"] ** 2 * sizes.get("draught", sizes["length"])
     return Scales(mass, sizes["length"], sizes["length"] / sizes["speed"], text)
 
 

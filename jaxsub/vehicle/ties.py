@@ -11,8 +11,8 @@ from typing import Any
 from ..effects import derivative
 from ..errors import InputError, nearest
 
-# a symbol such as Y_v|v|, or a number such as 2.5e-3, whose exponent is no symbol
-_NAME = re.compile(r"(?<![\w.])[A-Za-z_][\w|]*(?:\.[A-Za-z_]\w*)?")
+# a symbol such as Y_v|v|, Y_vvv/U or bow.gain; not the exponent of a number such as 2.5e-3
+_NAME = re.compile(r"(?<![\w.])[A-Za-z_][\w|]*(?:/U+(?!\w)|\.[A-Za-z_]\w*)?")
 _MOST = 200  # characters
 _UNITS = (2.0, 3.0, 5.0)  # of mass, length and time, in which dimensions are compared
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {

@@ -119,3 +119,9 @@ def test_tie_in_a_batch_is_that_of_each_member():
     sizes = jnp.linspace(0.5, 2.0, 5)
     found = jax.vmap(lambda x: vehicle.with_values(arrays({"K_delta_er": x})).values()["K_delta_el"])(sizes)
     np.testing.assert_array_equal(found, -sizes)
+
+
+def test_a_product_over_the_speed_is_one_name_in_an_expression():
+    """Claim: `Y_vvv/U` is the coefficient and not a quotient, also before a division by a number."""
+    vehicle = hull(**{"Y_vvv/U": -3.0, "Y_vvr/U": "Y_vvv/U / 20"})
+    assert float(vehicle.values()["Y_vvr/U"]) == pytest.approx(-0.15)
