@@ -160,6 +160,11 @@ class AbstractVehicle(eqx.Module):
         return frozenset()
 
     @property
+    def aliases(self) -> dict[str, str]:
+        """Names that expressions may have for numbers of effects, with the names of those numbers."""
+        return {}
+
+    @property
     def nonlinear(self) -> tuple[Any, ...]:
         """Parts of its own whose `force` of a motion is stepped explicitly and follows velocities."""
         return ()
@@ -182,8 +187,9 @@ class AbstractVehicle(eqx.Module):
     def with_values(self, values: Mapping[str, Values]) -> Self:
         """The same vehicle with other numbers for those named, and for those that follow from them."""
         if self.layout.ties:
-            every = {**self.own_values(), **values}
-            values = {**values, **{tie.name: tie.of(every) for tie in self.layout.ties}}
+            every, names = {**self.values(), **values}, self.aliases
+            every |= {alias: every[name] for alias, name in names.items()}
+            values = {**values, **{names.get(tie.name, tie.name): tie.of(every) for tie in self.layout.ties}}
         vehicle = self.with_own_values(values)
         effects = []
         for effect in self.effects:

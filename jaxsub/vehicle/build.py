@@ -5,10 +5,10 @@ import math
 
 import jax.numpy as jnp
 
-from ..effects import EQUATIONS, GRAVITY, AbstractEffect, derivative
+from ..effects import EQUATIONS, GRAVITY, AbstractEffect, derivative, parameter_table
 from ..errors import InputError
 from ..parameters import Parameter, number
-from .actuators import Actuators
+from .actuators import Actuators, stage_numbers
 from .base import Layout, Output, memory_states
 from .checks import (
     check_coefficients,
@@ -79,7 +79,9 @@ def build(
     rows = tuple(row for _, row in numbers.values())
     values = {key: number(value) for key, (value, _) in numbers.items()}
     given = {key: value for key, (value, _) in numbers.items()}
-    values |= {key: number(value) for key, value in tied_values(ties, given, where).items()}
+    given |= _before(actuators or Actuators(), effects)
+    tied = tied_values(ties, given, where)
+    values |= {key: number(value) for key, value in tied.items() if key in numbers}
     if kind == "submerged-body":
         values = _complete(values, where)
         hull = _sizes(values, hull)
@@ -100,10 +102,18 @@ def build(
         devices = (actuators or Actuators()).in_water(density).with_values(values)
         body = _body(values, layout, effects, devices, density, where)
         vehicle = dataclasses.replace(body, coriolis=coriolis)
+    if ties:
+        vehicle = vehicle.with_values({})  # the numbers of effects that follow others
     check_outputs(vehicle, where)
     check_effects(vehicle, where)
     require_inertia(vehicle, where)
     return vehicle
+
+
+def _before(devices: Actuators, effects: tuple[AbstractEffect, ...]) -> dict[str, float]:
+    """The numbers of what stands before the actuators, by the names that expressions have for them."""
+    values = {row.name: getattr(e, field) for e in effects for field, row in parameter_table(e).items()}
+    return {alias: float(values[name]) for alias, name in stage_numbers(devices.items, effects).items()}
 
 
 def _complete(values: dict, where: str) -> dict:

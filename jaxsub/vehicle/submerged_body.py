@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from ..arrays import Values
 from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal, coriolis, stream
 from ..parameters import number
-from .actuators import Actuators
+from .actuators import Actuators, stage_numbers
 from .base import AbstractVehicle, Layout, timed
 from .damping import Damping
 from .inertia import Inertia, sparse
@@ -140,6 +140,11 @@ class SubmergedBody(AbstractVehicle):
         names = (*self.inertia.added, *self.damping.coefficients, *self.products.coefficients)
         turning = () if self.coriolis == "linear" else ("coriolis",)
         return frozenset((*(term.name for term in derivatives(names).values()), *self.actuators.names, *turning))
+
+    @property
+    def aliases(self) -> dict[str, str]:
+        """Numbers of what stands before its actuators, such as `bow.time_constant`."""
+        return stage_numbers(self.actuators.items, self.effects)
 
     @property
     def nonlinear(self) -> tuple[Products | Actuators, ...]:

@@ -178,6 +178,21 @@ def test_numbers_are_the_vehicle_s_and_fixed_unless_the_file_frees_them():
     assert float(moved["starboard.gain"]) == 2.5
 
 
+def test_time_constant_may_follow_another():
+    """Claim: a common lag is one free number, in the vehicle's effects, after a fit's values and in the file."""
+    text = TEXT.replace("time_constant = 0.2", "time_constant = { value = 0.2, free = true }")
+    vehicle = rov(text.replace('gain = "port', 'time_constant = "2 * port.time_constant"\ngain = "port'))
+    assert [row.name for row in vehicle.layout.free][-1] == "actuator-lag[port].T"
+    assert float(vehicle.values()["actuator-lag[starboard].T"]) == pytest.approx(0.4)
+    moved = vehicle.with_values({"actuator-lag[port].T": jnp.asarray(0.5)})
+    assert float(moved.values()["actuator-lag[starboard].T"]) == 1.0
+    again = vehicle_from(tomllib.loads(vehicle_text(moved)), "again.toml")
+    assert vehicle_text(again) == vehicle_text(moved)
+    assert 'time_constant = "2 * port.time_constant"' in vehicle_text(moved)
+    with pytest.raises(InputError, match=r"actuators.starboard.time_constant: follows port.rate_limit, which is no nu"):
+        rov(text.replace('gain = "port', 'time_constant = "port.rate_limit"\ngain = "port'))
+
+
 def test_curve_in_a_file_is_converted_by_its_header(tmp_path):
     """Claim: a bench test in kgf and per cent is the table in N and parts of one, wherever the columns stand."""
     (tmp_path / "bench.csv").write_text("volts,thrust[kgf],command[%]\n12,-3.0,-100\n12,0.0,0\n12,4.0,100\n")

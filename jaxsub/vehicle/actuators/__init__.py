@@ -2,6 +2,7 @@
 
 from .base import Actuator, Actuators
 from .read import KINDS, read_actuators
+from .stages import stage_numbers
 from .write import actuator_tables
 
-__all__ = ["KINDS", "Actuator", "Actuators", "actuator_tables", "read_actuators"]
+__all__ = ["KINDS", "Actuator", "Actuators", "actuator_tables", "read_actuators", "stage_numbers"]

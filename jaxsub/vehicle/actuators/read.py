@@ -103,7 +103,7 @@ def _read(table: Table, name: str, inputs: tuple[str, ...], found: Reading, fold
     unit = _command_unit(item, table, found.input_units)
     for label, (entry, place, key) in listed.items():
         found.numbers[f"{name}.{label}"] = _number(item, f"{name}.{label}", key, entry, place, unit, found.ties)
-    found.stages += read_stages(table, item, unit)
+    found.stages += read_stages(table, item, unit, found.ties)
     values = {full: number(value) for full, (value, _) in found.numbers.items()}
     return Actuators((item,)).with_values(values).items[0]
 

@@ -1,6 +1,6 @@
 """What stands between a command and its actuator, as keys of `[actuators.NAME]`, and the effects that they are."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from ...effects import (
     AbstractActuator,
@@ -14,6 +14,7 @@ from ...effects import (
 from ...errors import InputError
 from ...parameters import Parameter
 from ..schema import Table, read_number
+from ..ties import Tie, read_tie
 from .base import Actuator
 
 # in the order in which a command passes them
@@ -24,8 +25,13 @@ STAGES: dict[str, type[AbstractActuator]] = {
 }
 
 
-def read_stages(table: Table, actuator: Actuator, unit: str) -> list[tuple[AbstractActuator, Parameter]]:
-    """The stages of an actuator whose input has the SI `unit`, each with the row of its one number."""
+def read_stages(
+    table: Table, actuator: Actuator, unit: str, ties: list[Tie]
+) -> list[tuple[AbstractActuator, Parameter]]:
+    """The stages of an actuator whose input has the SI `unit`, each with the row of its one number.
+
+    A number that follows others is added to `ties`, by the name `NAME.key`.
+    """
     found = []
     for key, kind in STAGES.items():
         if key not in table.data:
@@ -39,9 +45,14 @@ def read_stages(table: Table, actuator: Actuator, unit: str) -> list[tuple[Abstr
         row = parameter_table(kind(actuator=name))[field]
         per = {"rate_limit": unit and f"({unit})/s"}.get(key, "s")
         row = Parameter(row.name, per, free=False, lower=row.lower)
-        value, row = read_number(table.data[key], table.place(key), row)
+        entry, place = table.data[key], table.place(key)
+        if isinstance(entry, str):
+            ties.append(read_tie(f"{actuator.name}.{key}", entry, place))
+            found.append((kind(actuator=name), row))
+            continue
+        value, row = read_number(entry, place, row)
         if value <= 0.0:
-            raise InputError(table.place(key), f"is {value:g}", "give a positive number")
+            raise InputError(place, f"is {value:g}", "give a positive number")
         found.append((kind(actuator=name, **{field: value}), row))
     return found
 
@@ -60,4 +71,14 @@ def stages_of(actuator: Actuator, effects: Sequence[AbstractEffect]) -> dict[str
         if key is None or any(order.index(key) <= order.index(other) for other in found):
             break
         found[key] = effect
+    return found
+
+
+def stage_numbers(actuators: Iterable[Actuator], effects: Sequence[AbstractEffect]) -> dict[str, str]:
+    """Of the number of each stage, by the name `NAME.key` that expressions have for it, its name in the vehicle."""
+    found: dict[str, str] = {}
+    for item in actuators:
+        for key, effect in stages_of(item, effects).items():
+            (row,) = parameter_table(effect).values()
+            found[f"{item.name}.{key}"] = row.name
     return found

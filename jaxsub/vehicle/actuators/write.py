@@ -36,7 +36,8 @@ def actuator_tables(
             (field,) = (one.name for one in number_fields(effect))
             own = parameter_table(effect)[field]
             default = Parameter(own.name, free=False, lower=own.lower)
-            table[key] = written(float(getattr(effect, field)), rows.get(own.name), default)
+            value = float(getattr(effect, field))
+            table[key] = tied.get(f"{item.name}.{key}") or written(value, rows.get(own.name), default)
         said += stages.values()
         section[item.name] = table
     return section, said
