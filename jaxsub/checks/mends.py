@@ -34,29 +34,35 @@ class Mend:
     - `kind`: a reversed sign, a wrong factor, two axes swapped, a delay, a clock that runs at another rate, a mean
       difference.
     - `channels`: those that have it.
-    - `amount`: the factor; the mean difference (unit of the channel); the delay, or that of a clock at the end of the
-      run (s), positive for late.
+    - `amount`: the factor, which is -1 of a sign; the mean difference (unit of the channel); the delay, or that of a
+      clock at the end of the run (s), positive for late.
     """
 
     kind: Kind
     channels: tuple[str, ...]
     amount: float = 0.0
 
-    def undone(self, times: np.ndarray, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """The samples (samples,) of these channels without the fault, NaN where that needs what is outside the run."""
-        old = [columns[name] for name in self.channels]
-        if self.kind == "axis":
-            old.reverse()
-        if self.kind in ("sign", "factor"):
-            old = [values / self.amount if self.kind == "factor" else -values for values in old]
-        if self.kind == "drift":
-            old = [values - self.amount for values in old]
-        if self.kind in ("delay", "clock"):
-            late = np.full(times.shape, self.amount)
-            if self.kind == "clock":
-                late *= (times - times[0]) / (times[-1] - times[0])
-            old = [_at(times, values, times + late) for values in old]
-        return dict(zip(self.channels, old, strict=True))
+
+def undone(mends: Sequence[Mend], times: np.ndarray, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The samples (mends, samples) of channels without each of the faults `mends`, which differ in `amount` alone.
+
+    They are NaN where that needs what is outside the run.
+    """
+    kind, channels = mends[0].kind, mends[0].channels
+    amounts = np.array([[mend.amount] for mend in mends])
+    old = [columns[name] for name in channels]
+    if kind == "axis":
+        old.reverse()
+    if kind in ("sign", "factor"):
+        old = [values / amounts for values in old]
+    if kind == "drift":
+        old = [values - amounts for values in old]
+    if kind in ("delay", "clock"):
+        share = (times - times[0]) / (times[-1] - times[0]) if kind == "clock" else np.ones(times.shape)
+        rows, known = _nearest(times, times + amounts * share)
+        old = [np.where(known, values[rows], np.nan) for values in old]
+    whole = (len(mends), times.size)
+    return {name: np.broadcast_to(values, whole) for name, values in zip(channels, old, strict=True)}
 
 
 def gross(relation: Relation, names: Collection[str], factors: bool) -> list[Mend]:
@@ -65,7 +71,7 @@ def gross(relation: Relation, names: Collection[str], factors: bool) -> list[Men
     for name in sorted(relation.among):
         units = TURNS if is_angular(name) else TURNS | LENGTHS
         sizes = [size for known in units.values() for size in (known, 1.0 / known)] if factors else []
-        found += [Mend("sign", (name,)), *(Mend("factor", (name,), size) for size in sizes)]
+        found += [Mend("sign", (name,), -1.0), *(Mend("factor", (name,), size) for size in sizes)]
         for triad in (*_TRIADS, ANGLES):
             pairs = [tuple(sorted((name, other))) for other in triad if name in triad and other != name]
             found += [Mend("axis", pair) for pair in pairs if pair[0] in names and pair[1] in names]
@@ -91,8 +97,8 @@ def known_factor(angular: bool, factor: float, near: float) -> str:
     return next((name for name, size in units.items() if abs(shown / size - 1.0) < near), "")
 
 
-def _at(times: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
-    """The sample of `values` nearest to each other time, NaN in holes and outside of the run.
+def _nearest(times: np.ndarray, when: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The row of the sample nearest to each time `when`, and whether that is neither in a hole nor outside of the run.
 
     To interpolate would average noise, and so make channels agree better at any delay between samples.
     """
@@ -100,4 +106,4 @@ def _at(times: np.ndarray, values: np.ndarray, when: np.ndarray) -> np.ndarray:
     nearest = before + (when - times[before] > times[before + 1] - when)
     steps, interval = np.diff(times), 0.5 * float(np.median(np.diff(times)))
     reach = np.where(steps > longest_step(times), interval, np.maximum(0.5 * steps, interval))
-    return np.where(np.abs(when - times[nearest]) <= reach[before] * (1.0 + 1e-9), values[nearest], np.nan)
+    return nearest, np.abs(when - times[nearest]) <= reach[before] * (1.0 + 1e-9)

@@ -1,7 +1,7 @@
 """Kinematic relations between channels, without any model of forces: which rate belongs to which channel."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ class Motions:
 
     **Fields**
 
-    - `columns`: the samples (samples,) of each motion that is measured or prescribed, NaN where missing.
+    - `columns`: the samples (..., samples) of each motion that is measured or prescribed, NaN where missing.
     - `constants`: the value of each motion whose degree of freedom is locked.
     """
 
@@ -42,10 +42,10 @@ class Motions:
         return all(name in self.columns or name in self.constants for name in names)
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """The samples of a motion; zero where it is not known."""
+        """The samples (..., samples) of a motion; zero where it is not known."""
         if name in self.columns:
             return self.columns[name]
-        return np.full(next(iter(self.columns.values())).shape, self.constants.get(name, 0.0))
+        return np.full(next(iter(self.columns.values())).shape[-1:], self.constants.get(name, 0.0))
 
     def replaced(self, columns: Mapping[str, np.ndarray]) -> "Motions":
         """These motions with other samples of some."""
@@ -60,12 +60,12 @@ class Relation:
 
     - `channel`: whose changes are looked at; `partner`: the channel whose own rate that is, as `r` of `psi`, or the
       formula of several.
-    - `rate`: gives the rate (samples,) of `channel` from the motions.
+    - `rate`: gives the rate (..., samples) of `channel` from the motions.
     - `among`: the measured channels that take part, `channel` included.
     - `direct`: whether `partner` is a single channel. `exact`: whether every term is measured or at rest.
-    - `arms`: gives what a sensor 1 m off the origin along each body axis adds to `channel`, (3, samples); None for
-      angles and their rates, which have no arm.
-    - `leaks`: gives the rates (rates, samples) of which a gyro that is mounted 1 rad askew adds to this one; None where
+    - `arms`: gives what a sensor 1 m off the origin along each body axis adds to `channel`, (..., samples) each; None
+      for angles and their rates, which have no arm.
+    - `leaks`: gives the rates (..., samples) of which a gyro that is mounted 1 rad askew adds to this one; None where
       they are not measured.
     - `offset`: the largest mean of the rate (unit of `channel` a second) that is no fault, such as a current's; that
       of a direct relation is a share of the rate itself.
@@ -77,9 +77,9 @@ class Relation:
     among: frozenset[str]
     direct: bool
     exact: bool
-    arms: Callable[[Motions], np.ndarray] | None = None
+    arms: Callable[[Motions], Sequence[np.ndarray]] | None = None
     offset: float = 0.0
-    leaks: Callable[[Motions], np.ndarray] | None = None
+    leaks: Callable[[Motions], Sequence[np.ndarray]] | None = None
 
 
 def body_relations(motions: Motions) -> list[Relation]:
@@ -101,9 +101,9 @@ def _attitude(motions: Motions) -> list[Relation]:
     def turning(m: Motions) -> np.ndarray:
         return (m["q"] * np.sin(m["phi"]) + m["r"] * np.cos(m["phi"])) / _away_from_zero(np.cos(m["theta"]))
 
-    def leaking(*names: str) -> Callable[[Motions], np.ndarray] | None:
+    def leaking(*names: str) -> Callable[[Motions], Sequence[np.ndarray]] | None:
         there = [name for name in names if name in motions.columns]
-        return (lambda m: np.array([m[name] for name in there])) if there else None
+        return (lambda m: [m[name] for name in there]) if there else None
 
     rates = {
         "psi": ("r", turning, ("phi", "theta", "q")),
@@ -119,7 +119,7 @@ def _attitude(motions: Motions) -> list[Relation]:
             _among(motions, channel, partner, *others),
             True,
             motions.knows(*others),
-            leaks=leaking(*{"p", "q", "r"} - {partner}),
+            leaks=leaking(*(name for name in ("p", "q", "r") if name != partner)),
         )
         for channel, (partner, rate, others) in rates.items()
         if {channel, partner} <= set(motions.columns) and _counted(motions[channel])
@@ -146,7 +146,7 @@ def _position(motions: Motions) -> list[Relation]:
 
         others = ("u", "v", "w", "phi", "theta", "psi") if row < 2 else ("u", "v", "w", "phi", "theta")
         among, exact = _among(motions, channel, *others), motions.knows(*others)
-        arms = lambda m, row=row, channel=channel: np.array(np.broadcast_arrays(*_axes(m, row), m[channel])[:3])
+        arms = lambda m, row=row, channel=channel: np.broadcast_arrays(*_axes(m, row), m[channel])[:3]
         found.append(Relation(channel, formula, rate, among, False, exact, arms, offset))
     return found
 
@@ -185,9 +185,9 @@ def _accelerations(motions: Motions) -> list[Relation]:
         def rate(m: Motions, i: int = i, force: str = force) -> np.ndarray:
             return m[force] - turned(m)[i] + GRAVITY * _axes(m, 2)[i]
 
-        def arms(m: Motions, i: int = i) -> np.ndarray:
+        def arms(m: Motions, i: int = i) -> Sequence[np.ndarray]:
             p, q, r = (m[name] for name in ("p", "q", "r"))
-            return np.array([[0.0 * p, r, -q], [-r, 0.0 * p, p], [q, -p, 0.0 * p]][i])
+            return [[0.0 * p, r, -q], [-r, 0.0 * p, p], [q, -p, 0.0 * p]][i]
 
         among = _among(motions, velocity, force, "u", "v", "w", "p", "q", "r", "phi", "theta")
         partner = f"{force} less gravity and turning"

@@ -1,14 +1,15 @@
 """The search for the single fault that explains best why channels contradict each other."""
 
+import collections
 import dataclasses
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
 from .explanations import UNLIKE
 from .increments import Comparison, Windows, compared, filled, integrated, white
-from .mends import ANGLES, Kind, Mend, gross, is_angular, known_factor, late
+from .mends import ANGLES, Kind, Mend, gross, is_angular, known_factor, late, undone
 from .relations import Motions, Relation
 
 _SURE = 30.0  # log likelihood ratio of a fault, less what it costs
@@ -42,19 +43,15 @@ class Search:
         self._motions = motions.replaced(
             {name: filled(times, values, name in ANGLES) for name, values in motions.columns.items()}
         )
-        self._windows = [self._windows_of(relation) for relation in relations]
+        self._windows = [Windows.of(times, *self._sides(relation, self._motions)) for relation in relations]
         self._few = [windows.few for windows in self._windows]
-        self._inside: dict[tuple[int, bool, Kind, float], Comparison | None] = {}
-        pairs = [(self._windows, False), (self._few, True)]
-        self._plain = {
-            (i, few): self._compared(relation, None, windows[i])
-            for windows, few in pairs
-            for i, relation in enumerate(relations)
-        }
+        self._plain = [self._compared(index, self._motions) for index in range(len(relations))]
+        self._inside: dict[tuple[Kind, tuple[float, ...], int, bool], Comparison | None] = {}
 
     def mended(self, mend: Mend) -> "Search":
         """The search for what is wrong beside `mend`."""
-        motions = self._raw.replaced(mend.undone(self._times, self._raw.columns))
+        without = undone([mend], self._times, self._raw.columns)
+        motions = self._raw.replaced({name: values[0] for name, values in without.items()})
         return Search(self._times, motions, self._relations, self._reach)
 
     def best(self, named: Collection[tuple[Kind, tuple[str, ...]]]) -> tuple[Mend, Relation] | None:
@@ -62,30 +59,38 @@ class Search:
 
         Kinds and channels that were `named` before are left out.
         """
+        alike = collections.defaultdict(list)
+        for mend in self._candidates():
+            if (mend.kind, mend.channels) not in named:
+                alike[mend.kind, mend.channels].append(mend)
         scored = [
-            (gain[0], mend, gain[1])
-            for mend in self._candidates()
-            if (mend.kind, mend.channels) not in named and (gain := self._gain(mend))
+            (gain[0] - self._cost(mend), mend, gain[1])
+            for mends in alike.values()
+            for mend, gain in zip(mends, self._gains(mends), strict=True)
+            if gain
         ]
         if not scored:
             return None
-        score, mend, relation = max(scored, key=lambda entry: entry[0] - self._cost(entry[1]))
-        return (mend, relation) if score - self._cost(mend) > _SURE else None
+        # of faults that explain alike, whose scores differ by rounding alone, the first
+        score, mend, relation = max(scored, key=lambda entry: round(entry[0], 6))
+        return (mend, relation) if score > _SURE else None
 
     def distance(self, relation: Relation, mend: Mend) -> float:
         """The least distance of a relation with `mend`."""
-        found = self._compared(relation, mend, self._windows[self._relations.index(relation)])
-        return math.inf if found is None else found.distance
+        found = self._compared(self._relations.index(relation), self._without([mend]))
+        return math.inf if found is None else found.distance.item()
 
     def contradicts(self, relation: Relation) -> Comparison | None:
         """The comparison of a relation whose sides have little in common though one is far above the noise of both."""
-        plain = self._plain[self._relations.index(relation), False]
+        plain = self._plain[self._relations.index(relation)]
         if plain is None:
             return None
         values, rate = self._sides(relation, self._motions)
         interval = float(np.median(np.diff(self._times)))
+        holes = self._windows[self._relations.index(relation)].holes
         # white noise of both sides, integrated over as many samples as a window has
-        noise = 2.0 * white(self._times, values) + plain.durations * interval * white(self._times, rate)
+        integral = plain.durations * interval * white(self._times, rate, holes[1])
+        noise = 2.0 * white(self._times, values, holes[0]) + integral
         signal = np.maximum(plain.changes, plain.integrals) ** 2
         clear = (signal > _ABOVE * noise) & (plain.independent > _INDEPENDENT)
         return plain if clear.any() and float(np.min(plain.distances[clear])) > UNLIKE else None
@@ -94,10 +99,10 @@ class Search:
         names = set().union(*(relation.among for relation in self._relations))
         seen = set()
         for index, relation in enumerate(self._relations):
-            plain = self._plain[index, False]
+            plain = self._plain[index]
             if plain is None:
                 continue
-            bad = plain.distance > (_BAD if relation.exact else _APART)
+            bad = bool(plain.distance > (_BAD if relation.exact else _APART))
             # a small velocity of reversed sign leaves a small distance
             coarse = gross(relation, names, factors=bad) if bad or relation.exact else []
             for mend in [*coarse, *_scales(relation, plain), *_drifts(relation, plain)]:
@@ -115,79 +120,92 @@ class Search:
         lags = lags[lags <= _FURTHEST * span]
         if kind == "clock":
             lags = np.concatenate([lags[1::2], -lags[1::2]])
+        if not lags.size:
+            return
         found = []
         for group in late(kind, names, lags.tolist()):
-            scores = [((self._gain(mend, loose=True) or (0.0,))[0], mend) for mend in group]
-            if scores:
-                found.append(max(scores, key=lambda entry: entry[0]))
+            scores = self._scores(group)
+            at = int(np.argmax(scores))
+            found.append((scores[at], group[at]))
         for score, mend in sorted(found, key=lambda entry: -entry[0])[:4]:
             if score > 0.3 * _SURE:
                 yield self._zoomed(mend, score, step)
 
     def _zoomed(self, mend: Mend, score: float, step: float) -> Mend:
         """The delay of most gain about that of `mend`, to a fraction of a sample by a parabola."""
-        gain = lambda amount: (self._gain(dataclasses.replace(mend, amount=amount), loose=True) or (0.0,))[0]
+        scores = lambda *amounts: self._scores([dataclasses.replace(mend, amount=amount) for amount in amounts])
         best, stride = mend.amount, max(round(0.35 * abs(mend.amount) / step), 1)
         while stride:
-            for amount in (best - stride * step, best + stride * step):
-                other = gain(amount)
+            amounts = best - stride * step, best + stride * step
+            for amount, other in zip(amounts, scores(*amounts), strict=True):
                 if other > score:
                     score, best = other, amount
             stride //= 2
-        before, after = gain(best - step), gain(best + step)
+        before, after = scores(best - step, best + step)
         curvature = before - 2.0 * score + after
         shift = 0.5 * (before - after) / curvature if curvature < 0.0 else 0.0
         return dataclasses.replace(mend, amount=best + step * min(max(shift, -0.5), 0.5))
 
-    def _gain(self, mend: Mend, loose: bool = False) -> tuple[float, Relation] | None:
-        """The log likelihood ratio of a fault over all relations and where it is largest; None if it mends nothing."""
-        total, top = 0.0, None
+    def _scores(self, mends: Sequence[Mend]) -> list[float]:
+        """The gain of each of several faults that differ in amount, by few windows and whatever it leaves."""
+        return [gain[0] if gain else 0.0 for gain in self._gains(mends, loose=True)]
+
+    def _gains(self, mends: Sequence[Mend], loose: bool = False) -> list[tuple[float, Relation] | None]:
+        """The log likelihood ratio of each fault over all relations and where it is largest; None if it mends nothing.
+
+        The faults `mends` differ in amount alone.
+        """
+        kind, channels, motions = mends[0].kind, mends[0].channels, self._without(mends)
+        totals = [0.0] * len(mends)
+        tops: list[tuple[float, Relation, Comparison, Comparison, int] | None] = [None] * len(mends)
         for index, relation in enumerate(self._relations):
-            if relation.among.isdisjoint(mend.channels):
+            if relation.among.isdisjoint(channels):
                 continue
             # a delay of all that takes part changes nothing
-            if mend.kind in ("delay", "clock") and (not relation.exact or relation.among <= {*mend.channels}):
+            if kind in ("delay", "clock") and (not relation.exact or relation.among <= {*channels}):
                 continue
-            plain = self._plain_beside(mend, index, loose)
-            if plain is None:
+            plain, found = self._plain_beside(mends, index, loose), self._compared(index, motions, loose)
+            if plain is None or found is None:
                 continue
-            found = self._compared(relation, mend, (self._few if loose else self._windows)[index])
-            if found is None:
-                continue
+            plain, found = plain.repeated(len(mends)), found.repeated(len(mends))
             # residual noise is white after the right mend, and coloured by the fault before
             count = np.sqrt(plain.independent * found.independent)
             counts = plain.clear & found.clear & (plain.distances > _SCALE)
-            ratios = np.where(counts, -count * np.log(_left(mend, plain, found)), np.nan)
-            if not np.isfinite(ratios).any():
-                continue
-            at = int(np.nanargmax(np.abs(ratios)))
-            total += float(ratios[at])
+            ratios = np.where(counts, -count * np.log(_left(kind, plain, found)), np.nan)
+            largest = np.argmax(np.where(np.isfinite(ratios), np.abs(ratios), -1.0), axis=-1)
             # the mean of a rate shows in the channel whose rate it is, whatever else it explains
-            names = mend.kind != "drift" or relation.partner == mend.channels[0]
-            if names and (top is None or ratios[at] > top[0]):
-                top = float(ratios[at]), relation, plain, found, at
-        if top is None:
-            return None
-        _, relation, plain, found, at = top
-        return (total, relation) if loose or self._mends(mend, relation, plain, found, at) else None
+            names = kind != "drift" or relation.partner == channels[0]
+            for row, at in enumerate(largest.tolist()):
+                ratio = float(ratios[row, at])
+                if math.isnan(ratio):
+                    continue
+                totals[row] += ratio
+                top = tops[row]
+                if names and (top is None or ratio > top[0]):
+                    tops[row] = ratio, relation, plain[row], found[row], at
+        return [
+            (total, top[1]) if top and (loose or self._mends(mend, *top[1:])) else None
+            for mend, total, top in zip(mends, totals, tops, strict=True)
+        ]
 
-    def _plain_beside(self, mend: Mend, index: int, loose: bool) -> Comparison | None:
-        """The comparison of a relation without `mend`, in the windows in which it can be made with it.
+    def _plain_beside(self, mends: Sequence[Mend], index: int, loose: bool) -> Comparison | None:
+        """The comparisons of a relation without each of `mends`, in the windows in which they can be made with it.
 
         A delay leaves the ends of a run unknown; a window there, a start from rest, would count for any delay.
         """
-        if mend.kind not in ("delay", "clock"):
-            return self._plain[index, loose]
-        key = (index, loose, mend.kind, mend.amount)
+        kind = mends[0].kind
+        if kind not in ("delay", "clock"):
+            return self._plain[index]
+        key = (kind, tuple(mend.amount for mend in mends), index, loose)
         if key not in self._inside:
-            nothing = dataclasses.replace(mend, channels=("",)).undone(self._times, {"": np.zeros(self._times.size)})
-            windows = (self._few if loose else self._windows)[index]
-            self._inside[key] = self._compared(self._relations[index], None, windows, nothing[""])
+            of_none = [dataclasses.replace(mend, channels=("",)) for mend in mends]
+            nothing = undone(of_none, self._times, {"": np.zeros(self._times.size)})[""]
+            self._inside[key] = self._compared(index, self._motions, loose, nothing)
         return self._inside[key]
 
     def _mends(self, mend: Mend, relation: Relation, plain: Comparison, found: Comparison, at: int) -> bool:
         """Whether sides that were apart agree, and by more than what may be."""
-        if found.distance > _AGREED or _left(mend, plain, found)[at] > _LEFT[mend.kind]:
+        if found.distance > _AGREED or _left(mend.kind, plain, found)[at] > _LEFT[mend.kind]:
             return False
         if mend.kind in ("delay", "clock"):
             interval = max(self._interval(name) for name in relation.among)
@@ -222,28 +240,30 @@ class Search:
         sampled = np.isfinite(self._raw.columns[relation.channel])
         return np.where(sampled, motions[relation.channel], np.nan), relation.rate(motions)
 
-    def _windows_of(self, relation: Relation) -> Windows:
-        return Windows.of(self._times, *self._sides(relation, self._motions))
+    def _without(self, mends: Sequence[Mend]) -> Motions:
+        """The motions (mends, samples) without each of several faults that differ in amount."""
+        return self._motions.replaced(undone(mends, self._times, self._motions.columns))
 
     def _compared(
-        self, relation: Relation, mend: Mend | None, windows: Windows, nothing: np.ndarray | float = 0.0
+        self, index: int, motions: Motions, loose: bool = False, nothing: np.ndarray | float = 0.0
     ) -> Comparison | None:
-        """A relation with `mend`, or without; `nothing` (samples,) is NaN where samples shall not count, else 0."""
-        motions = (
-            self._motions if mend is None else self._motions.replaced(mend.undone(self._times, self._motions.columns))
-        )
-        arms, limit = None, self._reach
+        """A relation of `motions`, in few windows if `loose`.
+
+        `nothing` (..., samples) is NaN where samples shall not count, else 0.
+        """
+        relation, windows = self._relations[index], (self._few if loose else self._windows)[index]
+        arms, limit = (), self._reach
         if relation.arms is not None:
             arms = relation.arms(motions)
         elif relation.leaks is not None:
-            arms, limit = integrated(self._times, relation.leaks(motions)), _ASKEW
+            arms, limit = [integrated(self._times, leak) for leak in relation.leaks(motions)], _ASKEW
         values, rate = self._sides(relation, motions)
         return compared(self._times, values + nothing, rate + nothing, windows, arms, limit, relation.offset)
 
 
-def _left(mend: Mend, plain: Comparison, found: Comparison) -> np.ndarray:
+def _left(kind: Kind, plain: Comparison, found: Comparison) -> np.ndarray:
     """What a mend leaves of the squared differences at each length: by their own size, or by that of what it scales."""
-    if mend.kind in ("factor", "axis"):
+    if kind in ("factor", "axis"):
         return found.distances / plain.distances
     return found.residuals / plain.residuals
 
