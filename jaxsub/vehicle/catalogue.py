@@ -155,6 +155,11 @@ def dsrv() -> SubmergedBody:
     })  # fmt: skip
 
 
+def otter() -> SubmergedBody:
+    """Otter USV of Fossen's simulators, in surge, sway and yaw, with two propellers: a vehicle file."""
+    return _published("otter")
+
+
 def _published(name: str) -> SubmergedBody:
     vehicle = read_vehicle(Path(__file__).parent / "published" / f"{name}.toml")
     assert isinstance(vehicle, SubmergedBody)
