@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 from scipy.linalg import block_diag
 
 from ..estimate import estimate_disturbance
@@ -198,7 +198,7 @@ class Evidence:
         """Under the given disturbances, or shares of the view's."""
         own, known = view.disturbance, len(view.prior)
         count = columns.shown.shape[-1]
-        raw = cls(view, (view.base + columns).padded(padded_width(known + count)), np.ones(count), [])
+        raw = cls(view, _placed(view.base, columns), np.ones(count), [])
         first = raw.under(own)
         length = root_or_one(np.diag(first.gram)[known:])
         made = dataclasses.replace(raw, length=length)
@@ -224,10 +224,11 @@ class Evidence:
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Evidence":
         """Of a view along the same path whose residual and free parameters are sums `keep` (1 + p, 1 + m) of these."""
-        candidates = jax.tree.map(lambda column: column[..., len(keep) : len(keep) + len(self.length)], self.whole)
+        candidates = jax.tree.map(
+            lambda own: np.asarray(own)[..., len(keep) : len(keep) + len(self.length)], self.whole
+        )
         products = [one.seen_from(keep) for one in self.products]
-        whole = view.base + candidates
-        return Evidence(view, whole.padded(padded_width(whole.shown.shape[-1])), self.length, products)
+        return Evidence(view, _placed(view.base, candidates), self.length, products)
 
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
@@ -242,19 +243,31 @@ class Evidence:
     def left(self, chosen: Sequence[int], products: Products) -> Columns:
         """The residual, less what free parameters and `chosen` take up of it according to `products`."""
         weights = products.weights(chosen) / self._unit
-        return jax.tree.map(lambda column: (column[..., : len(weights)] @ weights)[..., None], self.whole)
+        return jax.tree.map(lambda column: (np.asarray(column)[..., : len(weights)] @ weights)[..., None], self.whole)
 
     def picked(self, chosen: Sequence[int]) -> Columns:
         """Some of the candidates' columns, of unit length."""
         own = np.array(chosen, int)
         at = len(self.view.prior) + own
-        return jax.tree.map(lambda column: column[..., at] / self.length[own], self.whole)
+        return jax.tree.map(lambda column: np.asarray(column)[..., at] / self.length[own], self.whole)
 
     def best(self, chosen: Sequence[int]) -> tuple[float, Products]:
         """The largest log evidence of `chosen` over the disturbances, and the products where it is."""
         values = [products.log_evidence(chosen) for products in self.products]
         best = int(np.argmax(values))
         return values[best], self.products[best]
+
+
+def _placed(base: Columns, candidates: Columns) -> Columns:
+    """Both side by side, padded to the width of a program and placed where programs take them from, copied once."""
+    known, count = base.shown.shape[-1], candidates.shown.shape[-1]
+
+    def beside(own: np.ndarray, more: np.ndarray) -> Array:
+        whole = np.zeros((*own.shape[:-1], padded_width(known + count)))
+        whole[..., :known], whole[..., known : known + count] = own, more
+        return jax.device_put(whole)
+
+    return jax.tree.map(beside, base, candidates)
 
 
 def evidence_of(view: View) -> float:

@@ -20,6 +20,8 @@ _DAMPED, _SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), (1.0, 0.5)
 # disturbance and numbers are sought in turns until the log likelihood changes by less, or gains less
 _TURNS, _STAYS = 8, 0.5
 _STEPS, _GAINED = 30, 2.0
+# a gain of log likelihood that no step is worth
+_ENOUGH = 0.1
 # a direction of the coefficients that nothing tells, relative to one that one column tells alone
 _UNTOLD = 1e-7
 
@@ -88,13 +90,17 @@ class Led:
     @quietly
     def descend(self, at: At) -> At:
         """Where a scoring step leads, or one that is damped (Levenberg 1944), within the bounds of each number; no step
-        where none makes the recordings more probable. The first that is tried is damped a little less than the last.
+        where none makes the recordings more probable, nor one that promises next to nothing. The first that is tried is
+        damped a little less than the last.
         """
         rows = at.vehicle.layout.free
         here = np.array([float(at.vehicle.values()[row.name]) for row in rows])
         low, high = (np.array([(row.lower, row.upper) for row in rows]).reshape(-1, 2).T - here) * at.length
         for tame in range(max(at.tame - 1, 0), len(_DAMPED)):
-            moved = here + _step(at.gram, _DAMPED[tame], low, high) / at.length
+            step = _step(at.gram, _DAMPED[tame], low, high)
+            if _promised(at.gram, step) < _ENOUGH:
+                return at
+            moved = here + step / at.length
             named = {row.name: np.asarray(value) for row, value in zip(rows, moved, strict=True)}
             trial = self.at(at.vehicle.with_values(named), at.disturbance)
             if trial.as_they_are < at.as_they_are:
@@ -115,6 +121,11 @@ def _step(gram: np.ndarray, damped: float, low: np.ndarray, high: np.ndarray) ->
     from scipy.optimize import lsq_linear
 
     return lsq_linear(factor.T, np.linalg.solve(factor, gram[1:, 0]), (low, high), method="bvls").x
+
+
+def _promised(gram: np.ndarray, step: np.ndarray) -> float:
+    """What a step would gain of the log likelihood if it were linear in the numbers."""
+    return float(step @ (gram[1:, 0] - 0.5 * gram[1:, 1:] @ step))
 
 
 def root_or_one(squares: Float[np.ndarray, " q"]) -> Float[np.ndarray, " q"]:

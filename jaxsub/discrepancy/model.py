@@ -8,7 +8,7 @@ import numpy as np
 from scipy import special
 
 from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, numbers, with_numbers
-from ..estimate import Ended, Fit, evaluate, search
+from ..estimate import Ended, Fit, evaluate, race, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .leading import by_cost
@@ -31,20 +31,18 @@ def join(
     The search begins at what innovations say of all numbers, and at the numbers of the `file`: those of a fit that had
     to do without the effects may lie where nothing leads back, such as a rudder that steers the other way. Where
     neither is better than that fit, it begins from the effects' predicted sizes or a tenth of them. It begins too at
-    vehicles with these effects that are `near` the answer. Numbers that are not free in the fit stay as they are in it.
+    vehicles with these effects that are `near` the answer. Searches that fall behind are given up. Numbers that are
+    not free in the fit stay as they are in it.
     """
     listed = {effect.label for effect in file.effects}
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
     values = fit.vehicle.values()
     held = {row.name: values[row.name] for row in fit.vehicle.layout.parameters if not row.free}
-    searched = lambda start: search(start.with_values(held).holding(held), fit.runs, sigma=fit.sigma)
-    starts = [*near, joined(view.vehicle, effects, 1.0), joined(file, [*earlier, *effects], 1.0)]
-    fits = [searched(start) for start in starts]
-    for share in (1.0, 0.1):
-        if any(float(found.cost) < float(fit.cost) for found in fits):
-            break
-        fits.append(searched(joined(fit.vehicle, effects, share)))
-    return evaluate(by_cost(fits)[0])
+    raced = lambda starts: race([start.with_values(held).holding(held) for start in starts], fit.runs, fit.sigma)
+    best = raced([*near, joined(view.vehicle, effects, 1.0), joined(file, [*earlier, *effects], 1.0)])
+    if not float(best.cost) < float(fit.cost):
+        best = by_cost([best, raced([joined(fit.vehicle, effects, share) for share in (1.0, 0.1)])])[0]
+    return evaluate(best)
 
 
 def freed(fit: Ended, start: AbstractVehicle) -> Fit:

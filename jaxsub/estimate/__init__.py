@@ -5,7 +5,7 @@ from .combined import Chain, Global
 from .disturbance import estimate_disturbance
 from .ends import Ends, ends
 from .filtered import Filtered
-from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, search
+from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, race, search
 from .initial_states import initial_guess, rest, state_channels
 from .method import AbstractMethod, Found, Iterative, Passes, share_for, shares_at_once
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
@@ -51,6 +51,7 @@ __all__ = [
     "newton",
     "newton_eq10",
     "posterior",
+    "race",
     "require_free",
     "rest",
     "scattered",

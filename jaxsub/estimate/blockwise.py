@@ -1,6 +1,8 @@
 """Gauss–Newton by expansions that are summed over blocks of samples, since long runs are too long for the memory."""
 
+import itertools
 import math
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax
@@ -13,8 +15,53 @@ from .method import Found, Iterative, Passes, from_start
 from .pool import ending
 from .problem import Problem
 
+# passes that several searches take before the worse half is given up
+_ROUND = 12
 # passes that a search takes as a rule, and by how much each brings it nearer at least, before it has shown itself
 _USUAL, _SLOWEST = 6, 0.7
+
+
+def _nobody(done: float, expected: float) -> None:
+    """Who is not told of passes."""
+
+
+class Descent:
+    """One damped Gauss–Newton search, a pass over all samples at a time."""
+
+    def __init__(self, method: "GaussNewton", problem: Problem, start: Float[Array, " d"]):
+        self._solver, self._most, self.problem = method.solver, method.max_steps, problem
+        self._y = self._trial = jax.device_put(np.asarray(start))
+        self._state: State | None = None
+        self._decrements: list[float] = []
+        self._result: RESULTS | None = None
+        self.done = False
+
+    @property
+    def cost(self) -> float:
+        """The least so far."""
+        return np.inf if self._state is None else float(self._state.at.cost)
+
+    @property
+    def passes(self) -> int:
+        """How many were made."""
+        return len(self._decrements)
+
+    def advance(self, tell: Passes) -> None:
+        """One pass more; `tell` as by `AbstractMethod.run`."""
+        expected = self.passes + _passes_left(self._decrements, self._solver.tolerance)
+        share = lambda part: tell(self.passes + part, expected)
+        gram = self.problem.products_in_blocks(self._trial, share)
+        if self._state is None:
+            self._state = self._solver.begin(self._y, eqx.filter_eval_shape(self.problem.expansion, self._y, gram))
+        self._y, self._state, done, self._result = _step(self._solver, self.problem, self._y, self._state, gram)
+        self._decrements.append(float(self._state.decrement))
+        self._trial, self.done = self._state.trial, bool(done) or self.passes >= self._most
+
+    @property
+    def found(self) -> Found:
+        """Where it is, as the only one of several searches."""
+        assert self._state is not None and self._result is not None
+        return _ended(self._y, self._state.at.cost, jax.device_put(np.asarray(self.passes)), self._result)
 
 
 class GaussNewton(Iterative):
@@ -36,22 +83,23 @@ class GaussNewton(Iterative):
         """As `Iterative.run`. `passes` is told of passes over all samples: how many are done and how many expected."""
         if len(starts) > 1 or outputs is not None or problem.march is not None:
             return super().run(problem, starts, outputs)
-        y = trial = jax.device_put(np.asarray(starts)[0])
-        state, tell = None, passes or (lambda done, expected: None)
-        decrements: list[float] = []
-        while True:
-            taken = len(decrements)
-            expected = taken + _passes_left(decrements, self.solver.tolerance)
-            share = lambda part, taken=taken, expected=expected: tell(taken + part, expected)
-            gram = problem.products_in_blocks(trial, share)
-            if state is None:
-                state = self.solver.begin(y, eqx.filter_eval_shape(problem.expansion, y, gram))
-            y, state, done, result = _step(self.solver, problem, y, state, gram)
-            trial = state.trial
-            decrements.append(float(state.decrement))
-            if bool(done) or len(decrements) >= self.max_steps:
-                break
-        return _ended(y, state.at.cost, jax.device_put(np.asarray(len(decrements))), result)
+        return raced([Descent(self, problem, starts[0])], passes or _nobody).found
+
+
+def raced(searches: Sequence[Descent], tell: Passes = _nobody) -> Descent:
+    """Some searches, all begun anew: the one that is best at its end.
+
+    All take some passes and the better half goes on, until one is left.
+    """
+    for limit in itertools.count(_ROUND, _ROUND):
+        for search in searches:
+            while not search.done and (search.passes < limit or len(searches) == 1):
+                search.advance(tell)
+        if len(searches) == 1:
+            break
+        by_cost = sorted(searches, key=lambda search: search.cost if np.isfinite(search.cost) else np.inf)
+        searches = by_cost[: len(searches) // 2]
+    return searches[0]
 
 
 @eqx.filter_jit

@@ -22,7 +22,7 @@ from ..likelihood import Columns, Disturbance, System, covariance_derivatives, p
 from .damped import Damped
 from .problem import Expansion
 
-_STEPS = 10
+_STEPS = 4
 # a gain of log likelihood that nothing depends on
 _ENOUGH = 0.1
 # standard deviations of weak priors on the logarithms of q, τ and κ: without them an absent force has no optimum

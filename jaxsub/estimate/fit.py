@@ -1,6 +1,7 @@
 """One `fit`, one `Fit`: maximum likelihood by whichever method."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax
@@ -14,6 +15,7 @@ from ..likelihood import BlockLinearised, Watch, concentrated_sigma, nobody, out
 from ..recording.runs import Runs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
+from .blockwise import Descent, raced
 from .curvature import alone
 from .method import AbstractMethod, Passes
 from .methods import filtered_first, gauss_newton
@@ -154,6 +156,15 @@ def search(
         if settled:
             break
     return Ended(fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=known_start)
+
+
+def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " c"]) -> Ended:
+    """The best of searches from several vehicles, as `search` finds it; those that fall behind are given up."""
+    begun = [Problem.of(vehicle, runs, sigma) for vehicle in vehicles]
+    best = raced([Descent(gauss_newton(), problem, problem.coordinates()) for problem in begun])
+    found = best.found.one(0)
+    fitted, states = best.problem.split(found.y)
+    return Ended(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
 
 
 @eqx.filter_jit

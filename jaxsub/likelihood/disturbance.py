@@ -26,6 +26,9 @@ from ..recording.runs import Runs
 from .innovation_products import Steps, beyond, innovation_products, passes, products_by_part
 from .sensitivity import Jacobians, Linearised, propagate
 
+# columns from which their number is padded to a multiple of so many
+_WIDE, _STEP = 256, 64
+
 
 class Disturbance(eqx.Module):
     """First-order Gauss–Markov forces and white noise.
@@ -160,7 +163,12 @@ def total_products(
 
 
 def padded_width(count: int) -> int:
-    """The least of 16, 24, 32, 48, 64, 96 … that is not less than `count`: at most half as many more."""
+    """The least of 16, 24, 32, 48, 64, 96 … 256 and multiples of 64 that is not less than `count`.
+
+    At most half as many more, and few where the products of very many columns with each other take most of the time.
+    """
+    if count > _WIDE:
+        return -(-count // _STEP) * _STEP
     power = max(16, 1 << (max(count, 1) - 1).bit_length())
     return 3 * power // 4 if count <= 3 * power // 4 and power > 16 else power
 

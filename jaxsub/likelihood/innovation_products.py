@@ -27,6 +27,8 @@ T = TypeVar("T")
 
 # samples whose innovations are held until their products are taken
 _AT_ONCE = 64
+# groups of columns whose products are taken once for each two of them, where there are more columns than a few
+_GROUPS, _FEW = 4, 256
 
 
 class Steps(NamedTuple):
@@ -132,7 +134,7 @@ def _filtered(
             before, gram = carry
             after, (white, logarithm) = jax.lax.scan(functools.partial(met, run), before, first + jnp.arange(length))
             flat = white.reshape(-1, q)
-            return (after, gram + flat.T @ flat), (jnp.sum(logarithm), before)
+            return (after, gram + _squares(flat)), (jnp.sum(logarithm), before)
 
         def part(state: tuple[Array, Array], firsts: Array) -> tuple[tuple[Array, Array], tuple]:
             (state, gram), (logarithm, begun) = jax.lax.scan(piece, (state, jnp.zeros((q, q), nothing.dtype)), firsts)
@@ -142,7 +144,24 @@ def _filtered(
 
     nothing = jnp.zeros((len(begin), q), steps.shown.dtype)
     # one run after the other: products of three dimensions are slower than three of two
-    return jax.lax.map(of_run, jnp.arange(len(steps.noise)))
+    gram, logarithm, begun = jax.lax.map(of_run, jnp.arange(len(steps.noise)))
+    return _mirrored(gram), logarithm, begun
+
+
+def _squares(flat: Float[Array, "n q"]) -> Float[Array, "q q"]:
+    """Products of all columns, those of two different groups of columns once: the upper triangle of blocks."""
+    width = flat.shape[1]
+    size = -(-width // (_GROUPS if width > _FEW else 1))
+    rows = [
+        jnp.pad(flat[:, first : first + size].T @ flat[:, first:], [(0, 0), (first, 0)])
+        for first in range(0, width, size)
+    ]
+    return jnp.concatenate(rows)
+
+
+def _mirrored(upper: Float[Array, "*m q q"]) -> Float[Array, "*m q q"]:
+    """A symmetric matrix by its upper triangle."""
+    return jnp.triu(upper) + jnp.swapaxes(jnp.triu(upper, 1), -1, -2)
 
 
 def _sample(steps: Steps, run: Array, k: Array) -> Steps:
