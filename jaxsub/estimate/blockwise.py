@@ -48,7 +48,7 @@ class Descent:
 
     def advance(self, tell: Passes) -> None:
         """One pass more; `tell` as by `AbstractMethod.run`."""
-        expected = self.passes + _passes_left(self._decrements, self._solver.tolerance)
+        expected = float(self.passes + _passes_left(self._decrements, self._solver.tolerance))
         share = lambda part: tell(self.passes + part, expected)
         gram = self.problem.products_in_blocks(self._trial, share)
         if self._state is None:
