@@ -24,7 +24,7 @@ from scipy.linalg import block_diag
 from ..estimate import estimate_disturbance
 from ..likelihood import Columns, Disturbance, padded_width
 from .columns import force_columns
-from .leading import root_or_one
+from .innovation_search import root_or_one
 from .settings import DISTURBANCE_SHARES, MOST_COLUMNS
 from .view import View
 

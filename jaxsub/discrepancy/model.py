@@ -11,7 +11,7 @@ from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, nu
 from ..estimate import Ended, Fit, evaluate, race, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
-from .leading import by_cost
+from .innovation_search import by_cost
 from .settings import NEGLIGIBLE, SIGNIFICANCE
 from .view import View
 

@@ -24,7 +24,7 @@ from ..likelihood import (
 )
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
-from .leading import At, Led, apart, arrived, by_cost, of_order, settled, turned
+from .innovation_search import InnovationSearch, Iterate, by_cost, distinct, with_wide_priors
 from .settings import BLOCKS, LARGE_ERROR
 from .tones import tones
 from .whiteness import record_sigma
@@ -143,23 +143,23 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     velocity log, numbers a hundred times too large can do what an actuator's force does, and nothing would be left to
     name it by.
     """
-    problem, rms = of_order(fit.problem), fit.rms
+    problem, rms = with_wide_priors(fit.problem), fit.rms
     # such a fit is not trusted to have ended near the truth
     much = max(rms.values()) > LARGE_ERROR
-    led = Led(problem, problem.guess if much else fit.start)
+    search = InnovationSearch(problem, problem.guess if much else fit.start)
     guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.spread), noise=_white(fit))
     vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
     if much:
         vehicles += [file] if file is not None else []
         in_sensors, doubted = _doubting(guess, np.array([rms[c] for c in fit.vehicle.layout.channels]))
         starts.append([in_sensors])
-    best = lambda pairs: by_cost(led.at(*pair) for pair in pairs)[0]
-    searches = [best([(v, start) for start in some]) for v in vehicles for some in starts]
-    searches += by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
-    while len(searches) > 1:
-        searches = apart(turned(led, at) for at in searches)
-        searches = searches[: max(1, len(searches) // 2)]
-    return _seen(led, settled(led, searches[0]))
+    best = lambda pairs: by_cost(search.evaluate(*pair) for pair in pairs)[0]
+    iterates = [best([(v, start) for start in some]) for v in vehicles for some in starts]
+    iterates += by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
+    while len(iterates) > 1:
+        iterates = distinct(search.alternated(iterate) for iterate in iterates)
+        iterates = iterates[: max(1, len(iterates) // 2)]
+    return _view(search, search.converged(iterates[0]))
 
 
 def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: Iterable[Disturbance]) -> View:
@@ -168,18 +168,29 @@ def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: I
     One search, from the best of some disturbances: of numbers that came of innovations already, but for a few. It goes
     on until it arrives: of what is far off, a linear picture promises much that is not so.
     """
-    problem = of_order(Problem.of(vehicle, runs, sigma))
-    led = Led(problem, problem.guess)
-    return _seen(led, arrived(led, by_cost(led.at(vehicle, one) for one in disturbances)[0]))
+    problem = with_wide_priors(Problem.of(vehicle, runs, sigma))
+    search = InnovationSearch(problem, problem.guess)
+    return _view(search, search.maximised(by_cost(search.evaluate(vehicle, one) for one in disturbances)[0]))
 
 
 @quietly
-def _seen(led: Led, at: At) -> View:
-    """What is seen from there."""
-    runs, sigma = led.problem.runs, led.problem.sigma
-    path = Trajectory.of(at.vehicle, runs, at.followed.expected, at.followed.filtered)
-    covariance = np.linalg.inv(at.gram[1:, 1:]) / np.outer(at.length, at.length)
-    return View(at.vehicle, covariance, runs, sigma, at.followed, at.disturbance, path, at.base, at.prior, at.length)
+def _view(search: InnovationSearch, iterate: Iterate) -> View:
+    """The view at an iterate of a search."""
+    runs, sigma, followed = search.problem.runs, search.problem.sigma, iterate.followed
+    path = Trajectory.of(iterate.vehicle, runs, followed.expected, followed.filtered)
+    covariance = np.linalg.inv(iterate.gram[1:, 1:]) / np.outer(iterate.length, iterate.length)
+    return View(
+        iterate.vehicle,
+        covariance,
+        runs,
+        sigma,
+        followed,
+        iterate.disturbance,
+        path,
+        iterate.base,
+        iterate.prior,
+        iterate.length,
+    )
 
 
 def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturbance, list[Disturbance]]:

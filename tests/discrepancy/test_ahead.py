@@ -13,7 +13,7 @@ from jaxsub.discrepancy.cross_validation import Predicted, one_step_ahead
 from jaxsub.discrepancy.evaluation import evaluated
 from jaxsub.discrepancy.evidence import evidence_of
 from jaxsub.discrepancy.examine import listed
-from jaxsub.discrepancy.leading import Led, of_order
+from jaxsub.discrepancy.innovation_search import InnovationSearch, with_wide_priors
 from jaxsub.discrepancy.many import asked_for, by_what_comes_next
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.restarts import restarted
@@ -114,8 +114,8 @@ def test_a_view_that_lacks_an_effect_is_that_of_the_vehicle_without_it():
     view = led_from(vehicle, runs, SIGMA, [dataclasses.replace(STILL, force=jnp.array([1.0]))])
     effect = view.vehicle.effects[-1]
     fewer = lacking(listed(view, None, present=True), effect).evidence.view
-    problem = of_order(Problem.of(fewer.vehicle, runs, SIGMA))
-    anew = Led(problem, problem.guess).at(fewer.vehicle, view.disturbance)
+    problem = with_wide_priors(Problem.of(fewer.vehicle, runs, SIGMA))
+    anew = InnovationSearch(problem, problem.guess).evaluate(fewer.vehicle, view.disturbance)
     before, there, expected = (squares(one) for one in (view, fewer, anew))
     assert abs(numbers(effect)["coefficient"]) > 1e-4
     assert abs(there - expected) < 0.05 * abs(expected - before)

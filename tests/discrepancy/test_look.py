@@ -9,7 +9,7 @@ import pytest
 from diagnosis_cases import recorded, wrong
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy import batch, leading, view
+from jaxsub.discrepancy import batch, innovation_search, view
 from jaxsub.discrepancy.evidence import evidence_of
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
@@ -58,28 +58,29 @@ def test_runs_of_unequal_length_have_a_disturbance(fitted):
 def test_searches_that_agree_are_one():
     """Claim: of searches that came to the same cost one goes on; the order is by cost, those without one last."""
 
-    def at(cost):
-        made = object.__new__(leading.At)
+    def iterate(cost):
+        made = object.__new__(innovation_search.Iterate)
         made.__dict__["cost"] = cost
         return made
 
     nan = float("nan")
-    apart = leading.apart(at(cost) for cost in (nan, 9.0, 3.0, 9.2, 3.1, nan))
-    assert [one.cost for one in apart[:2]] == [3.0, 9.0]
-    assert all(one.cost != one.cost for one in apart[2:])
+    found = innovation_search.distinct(iterate(cost) for cost in (nan, 9.0, 3.0, 9.2, 3.1, nan))
+    assert [one.cost for one in found[:2]] == [3.0, 9.0]
+    assert all(one.cost != one.cost for one in found[2:])
 
 
 @pytest.mark.parametrize(("costs", "turns"), [((9.0, 5.0, 4.9, 0.0), 2), ((math.nan, math.nan, math.nan), 1)])
-def test_turns_end_where_the_cost_stays_or_there_is_none(monkeypatch, costs, turns):
-    """Claim: numbers and disturbance are sought in turns while the cost falls, and once where it is no number."""
+def test_alternations_end_where_the_cost_stays_or_is_not_a_number(monkeypatch, costs, turns):
+    """Claim: parameters and disturbance alternate while the cost falls, and once where it is no number."""
 
-    def at(number):
-        made = object.__new__(leading.At)
+    def iterate(number):
+        made = object.__new__(innovation_search.Iterate)
         made.__dict__.update(cost=costs[number], number=number)
         return made
 
-    monkeypatch.setattr(leading, "turned", lambda led, one: at(one.__dict__["number"] + 1))
-    assert leading.settled(object.__new__(leading.Led), at(0)).__dict__["number"] == turns
+    search = innovation_search.InnovationSearch
+    monkeypatch.setattr(search, "alternated", lambda self, one: iterate(one.__dict__["number"] + 1))
+    assert object.__new__(search).converged(iterate(0)).__dict__["number"] == turns
 
 
 def test_numbers_that_the_recordings_do_not_tell_are_of_the_order_of_the_files():
