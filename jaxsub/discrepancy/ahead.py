@@ -18,15 +18,15 @@ from ..estimate import Ended, evaluate, initial_guess
 from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import SUCCESSFUL
 from ..vehicle import AbstractVehicle
+from .acceptance import Model, ModelFitter, fitted_model
 from .cross_validation import Comparison, compare, one_step_ahead, simulated
 from .evidence import evidence_of
-from .model import freed, joined, places
+from .model import amplitude_indices, refit, with_scaled_effects
 from .programs import make_room
 from .restarts import restarted, starts
 from .selector import Selector
 from .settings import BLOCKS, FEWEST_SAMPLES, MOST_RESTARTS, RESTART_ERROR
 from .stiffness import substeps_for
-from .trial import Model, Trial, fitted_model
 from .view import View, led_from, look
 
 
@@ -37,7 +37,7 @@ class Ahead:
     Their simulation errors are taken to be those of the model that they were begun from.
     """
 
-    trial: Trial
+    fitter: ModelFitter
 
     def begin(self, model: Model) -> Model:
         """A model with its view's numbers."""
@@ -52,8 +52,8 @@ class Ahead:
     ) -> Model:
         """A model with `effects` more, its numbers moved from where they are, or from the first that are `near`."""
         make_room()
-        self.trial.progress(f"following with {', '.join(effect.label for effect in effects)}")
-        vehicle = near[0] if near else joined(model.view.vehicle, effects, 1.0)
+        self.fitter.progress(f"following with {', '.join(effect.label for effect in effects)}")
+        vehicle = near[0] if near else with_scaled_effects(model.view.vehicle, effects, 1.0)
         runs = model.view.runs
         finer = max(runs.substeps, substeps_for(vehicle, runs, model.view.path.start))
         runs, disturbances = dataclasses.replace(runs, substeps=finer), (disturbance, model.view.disturbance)
@@ -97,7 +97,7 @@ def lacking_view(view: View, effect: AbstractEffect) -> tuple[View, np.ndarray]:
     others = [i for i in range(len(rows)) if i not in own]
     keep = np.eye(1 + len(rows))[:, [0, *(1 + i for i in others)]]
     # what it does now is no longer there, and so is in the residual
-    for i in places(view, effect):
+    for i in amplitude_indices(view, effect):
         keep[1 + i, 0] = float(values[rows[i].name]) * view.length[i]
     across = view.covariance[np.ix_(others, own)]
     taken = across @ np.linalg.solve(view.covariance[np.ix_(own, own)], across.T)
@@ -112,13 +112,13 @@ def lacking_view(view: View, effect: AbstractEffect) -> tuple[View, np.ndarray]:
     return fewer, keep
 
 
-def proved(trial: Trial, base: Model, best: Model) -> Model | None:
+def proved(fitter: ModelFitter, base: Model, best: Model) -> Model | None:
     """The `best` model of innovations as it is simulated, if it is accepted beside `base`.
 
     Fitted to free runs if it runs free, else begun anew as often as it has to be: to where a free run of an unstable
     vehicle is lost a search finds numbers that suit it no more than others.
     """
-    trial.progress(f"free runs with {', '.join(effect.label for effect in best.added)}")
+    fitter.progress(f"free runs with {', '.join(effect.label for effect in best.added)}")
     pieces = pieces_of(best.view)
     if pieces is None:
         return None
@@ -126,10 +126,10 @@ def proved(trial: Trial, base: Model, best: Model) -> Model | None:
     if pieces > 1:
         before, after = (in_pieces(model, pieces) for model in (base, best))
     else:
-        fit = freed(best.fit, best.view.vehicle)
+        fit = refit(best.fit, best.view.vehicle)
         view = look(fit, best.view.disturbance)
         after = fitted_model(fit, view, best.added)
-    return after if compare(before.predicted, after.predicted, after.stands).accepted else None
+    return after if compare(before.predicted, after.predicted, after.significant).accepted else None
 
 
 def pieces_of(view: View) -> int | None:

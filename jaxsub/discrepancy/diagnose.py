@@ -13,6 +13,7 @@ from ..findings import Finding
 from ..recording import Recording
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle, vehicle_findings
+from .acceptance import Examination, Model, ModelFitter, fitted_model
 from .advice import next_manoeuvre
 from .ahead import in_pieces
 from .batch import batch
@@ -23,7 +24,7 @@ from .examine import examine
 from .explain import explained
 from .kinds import leading, missing, right
 from .locate import Field, effect_shares, locations, shares, traces
-from .model import allowing_for
+from .model import with_coloured_errors
 from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress, limited
@@ -32,7 +33,6 @@ from .show import channel_quality, coefficients, estimates, run_quality, trades
 from .shown import shown_on
 from .stand_in import described
 from .summary import summary
-from .trial import Found, Model, Trial, fitted_model
 from .validation import beyond_noise
 from .verdict import Judged
 from .view import View, look
@@ -77,11 +77,11 @@ def diagnose(
     found = examine(view, vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
-    trial, baseline = Trial(until, vehicle), fitted_model(start, found.view, ())
+    fitter, baseline = ModelFitter(until, vehicle), fitted_model(start, found.view, ())
     account = _Account(vehicle, train, found, field, baseline)
     so_far = lambda model, judged: keep(*account.of(model, model, judged, ()))
-    named, judged, left = explained(trial, baseline, found, vocabulary, so_far, begin)
-    best, judged = (named, judged) if left is None else described(trial, named, left, judged, vocabulary)
+    named, judged, left = explained(fitter, baseline, found, vocabulary, so_far, begin)
+    best, judged = (named, judged) if left is None else described(fitter, named, left, judged, vocabulary)
     if best.pieces > 1:
         account = dataclasses.replace(account, baseline=in_pieces(baseline, best.pieces))
     progress("simulating the test runs")
@@ -94,14 +94,14 @@ class _Account:
 
     vehicle: AbstractVehicle
     train: Sequence[Recording]
-    first: Found
+    first: Examination
     field: Field
     baseline: Model
 
     @cached_property
     def start(self) -> Fit:
         """The baseline's fit, with errors that allow for its disturbance: the same in every answer."""
-        return allowing_for(self.baseline.view, self.baseline.fit)
+        return with_coloured_errors(self.baseline.view, self.baseline.fit)
 
     def of(
         self, named: Model, best: Model, judged: Judged, test: Sequence[Recording]
@@ -112,7 +112,7 @@ class _Account:
         """
         vehicle, train, field, layout = self.vehicle, self.train, self.field, self.vehicle.layout
         start, baseline = self.start, self.baseline
-        improved = allowing_for(best.view, best.fit) if best.added else start
+        improved = with_coloured_errors(best.view, best.fit) if best.added else start
         sigma = np.asarray(start.sigma)
         standing = best.added[len(named.added) :]
         channels = channel_quality(improved)
@@ -120,7 +120,7 @@ class _Account:
         if shown is not None:
             judged = consistent(judged, shown.explained, shown.left, shown.assessment)
         where = _where(judged, self.first, field, train)
-        own = improved if named is best else allowing_for(named.view, named.fit)
+        own = improved if named is best else with_coloured_errors(named.view, named.fit)
         physics = [_physics(one, own) for one in judged.named]
         found = None if shown is None else shown.explained
         diagnosis = Diagnosis(
@@ -168,7 +168,7 @@ def _findings(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> tupl
     return tuple(dict.fromkeys([*vehicle_findings(vehicle, vehicle.layout.name), *of_runs]))
 
 
-def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording]) -> list[Location]:
+def _where(judged: Judged, found: Examination, field: Field, train: Sequence[Recording]) -> list[Location]:
     """The mismatch's places: where accepted effects act, or where the force without a name does, else as located."""
     if judged.verdict == "none":
         return []
@@ -176,9 +176,9 @@ def _where(judged: Judged, found: Found, field: Field, train: Sequence[Recording
     if judged.named:
         effects = [one.effect for one in judged.named]
         share = effect_shares(view, effects, found.naming.products.disturbance)
-    elif found.nameless is not None:
+    elif found.nonparametric is not None:
         share = {place: 0.5 * part for place, part in share.items()}
-        share[found.nameless] = share.get(found.nameless, 0.0) + 0.5
+        share[found.nonparametric] = share.get(found.nonparametric, 0.0) + 0.5
     return locations(field, view, train, share)
 
 

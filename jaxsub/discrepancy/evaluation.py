@@ -12,12 +12,12 @@ from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
+from .acceptance import Model
 from .batch import batch
 from .cross_validation import gain
 from .diagnosis import Gain, Overlay
 from .restarts import restarted
 from .settings import BLOCKS
-from .trial import Model
 
 
 @dataclasses.dataclass(frozen=True)

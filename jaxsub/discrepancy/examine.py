@@ -4,6 +4,7 @@ import numpy as np
 
 from ..effects import AbstractEffect, candidates, looked_at
 from ..likelihood import whitened
+from .acceptance import Examination
 from .columns import candidate_columns
 from .evidence import Evidence
 from .generic import pattern
@@ -11,13 +12,12 @@ from .name import Naming, name
 from .programs import make_room
 from .progress import Progress
 from .selector import Selector
-from .trial import Found
 from .tuned import tuned
 from .view import View, facts
 from .whiteness import RANDOM, Memory, memory
 
 
-def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Found:
+def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Examination:
     """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
     return weighed(view, listed(view, vocabulary), progress)
 
@@ -32,15 +32,17 @@ def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, *, p
     return Selector(Evidence.of(view, columns), effects, owners, looked_at(known, vocabulary))
 
 
-def weighed(view: View, selector: Selector, progress: Progress) -> Found:
+def weighed(view: View, selector: Selector, progress: Progress) -> Examination:
     """What the candidates of a selector that are usable say, and a force without a name beside them."""
     naming, evidence = name(selector, progress), selector.evidence
     if naming.again:
-        return Found(view, selector, naming, None, RANDOM)
+        return Examination(view, selector, naming, None, RANDOM)
     progress("looking for forces without a name")
     bare = evidence.best([])[1]
     under = [naming.products] if naming.products is bare else [bare, naming.products]
-    return Found(view, selector, naming, pattern(view, evidence, naming.columns, under), _memory(evidence, naming))
+    return Examination(
+        view, selector, naming, pattern(view, evidence, naming.columns, under), _memory(evidence, naming)
+    )
 
 
 def _memory(evidence: Evidence, naming: Naming) -> Memory:

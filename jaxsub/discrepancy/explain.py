@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator, Sequence
 from ..effects import AbstractEffect
 from ..errors import InputError
 from ..results import RESULTS
+from .acceptance import Examination, Model, ModelFitter, accept_proposed, proposed_effects
 from .cross_validation import compare
 from .evidence import evidence_of
 from .examine import examine, weighed
@@ -13,18 +14,17 @@ from .many import by_what_comes_next
 from .name import standing
 from .progress import OutOfTime
 from .settings import EXPLAINED, MAJORITY, MOST_EFFECTS, MOST_REJECTIONS
-from .trial import Found, Model, Trial, tried, worth_trying
 from .verdict import NOTHING, Judged, both, by_fit, helped, idle, incomplete, judge, settled
 from .whiteness import share_of
 
 # a model, what is to be said with it, and the last look at what it leaves, if anything may be left
-Answer = tuple[Model, Judged, Found | None]
+Answer = tuple[Model, Judged, Examination | None]
 
 
 def explained(
-    trial: Trial,
+    fitter: ModelFitter,
     baseline: Model,
-    found: Found,
+    found: Examination,
     vocabulary: tuple[type[AbstractEffect], ...] | None,
     keep: Callable[[Model, Judged], object] = lambda model, judged: None,
     begin: Sequence[AbstractEffect] = (),
@@ -33,7 +33,7 @@ def explained(
 
     Each answer before the last is given to `keep`.
     """
-    rounds = answers(trial, baseline, found, vocabulary, begin)
+    rounds = answers(fitter, baseline, found, vocabulary, begin)
     last: tuple[Model, Judged] | None = None
     try:
         while True:
@@ -47,9 +47,9 @@ def explained(
 
 
 def answers(
-    trial: Trial,
+    fitter: ModelFitter,
     baseline: Model,
-    found: Found,
+    found: Examination,
     vocabulary: tuple[type[AbstractEffect], ...] | None,
     begin: Sequence[AbstractEffect] = (),
 ) -> Generator[tuple[Model, Judged], None, Answer]:
@@ -66,45 +66,47 @@ def answers(
     dropped: set[str] = set()
     # a free run that cannot be fitted asks for nothing
     told_ahead = bool(baseline.fit.result != RESULTS.successful)
-    ahead = by_what_comes_next(trial, baseline, vocabulary) if told_ahead else None
+    ahead = by_what_comes_next(fitter, baseline, vocabulary) if told_ahead else None
     if ahead is not None:
         return *ahead, None
     if begin:
-        best, judged = begun(trial, baseline, found, begin)
+        best, judged = begun(fitter, baseline, found, begin)
         if judged.named:
             yield best, judged
-            found = examine(best.view, vocabulary, trial.progress)
+            found = examine(best.view, vocabulary, fitter.progress)
     while True:
         said, after = judge(found.naming, found.pattern, found.memory), None
-        chosen = worth_trying(found, said)
+        chosen = proposed_effects(found, said)
         # what was left out once and is asked for again stays: it would come and go
         older = [effect for effect in best.added if effect.label not in dropped]
         if chosen:
-            best, said = tried(trial, best, found, chosen, said)
+            best, said = accept_proposed(fitter, best, found, chosen, said)
         else:
-            best, said, after = after_all(trial, best, found, said, vocabulary)
+            best, said, after = after_all(fitter, best, found, said, vocabulary)
         judged = both(judged, said)
         if chosen and said.named:
-            best, judged = without_idle(trial, baseline, best, judged, older)
+            best, judged = without_idle(fitter, baseline, best, judged, older)
             dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
         if chosen and not said.named:
-            ahead = None if told_ahead else by_what_comes_next(trial, best, vocabulary)
+            ahead = None if told_ahead else by_what_comes_next(fitter, best, vocabulary)
             if ahead is not None:
                 return ahead[0], both(judged, ahead[1]), None
             told_ahead = True
             if said.verdict == "unknown" and refusals < MOST_REJECTIONS:
-                refusals, after = refusals + 1, weighed(found.view, found.selector, trial.progress)
+                refusals, after = refusals + 1, weighed(found.view, found.selector, fitter.progress)
         if after is None and not said.named:
             return best, judged, found
-        whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.remains)
+        whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.unexplained)
         if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
             return best, judged, None
         if said.named:
             yield best, judged
-        found = after or examine(best.view, vocabulary, trial.progress)
+        found = after or examine(best.view, vocabulary, fitter.progress)
 
 
-def begun(trial: Trial, baseline: Model, found: Found, effects: Sequence[AbstractEffect]) -> tuple[Model, Judged]:
+def begun(
+    fitter: ModelFitter, baseline: Model, found: Examination, effects: Sequence[AbstractEffect]
+) -> tuple[Model, Judged]:
     """The model with the `effects` of an earlier answer, if they are accepted together, and what is to be said.
 
     Probabilities are those of the first look. **Raises** `InputError` for an effect that is not among its candidates.
@@ -115,17 +117,17 @@ def begun(trial: Trial, baseline: Model, found: Found, effects: Sequence[Abstrac
         own = [i for i, candidate in enumerate(selector.candidates) if candidate.label == label]
         if not own:
             what = f"{label} is not among the effects that these recordings may ask for"
-            raise InputError(trial.file.layout.name, what, "begin without it")
+            raise InputError(fitter.file.layout.name, what, "begin without it")
         numbers.append(max(own, key=lambda i: found.naming.first.value[i]))
-    model = trial.with_effects(baseline, effects, found.naming.products.disturbance)
-    gain = compare(baseline.predicted, model.predicted, model.stands)
+    model = fitter.with_effects(baseline, effects, found.naming.products.disturbance)
+    gain = compare(baseline.predicted, model.predicted, model.significant)
     named = standing(selector, numbers) if gain.accepted else []
     judged = dataclasses.replace(NOTHING, p_value=min(1.0, 2.0 * found.naming.first_p))
     return (model if gain.accepted else baseline), settled(helped(judged, ", ".join(labels), gain), named)
 
 
 def without_idle(
-    trial: Trial, baseline: Model, best: Model, judged: Judged, older: Sequence[AbstractEffect]
+    fitter: ModelFitter, baseline: Model, best: Model, judged: Judged, older: Sequence[AbstractEffect]
 ) -> tuple[Model, Judged]:
     """The model less those `older` effects that are not accepted any more, and what is then to be said.
 
@@ -133,18 +135,22 @@ def without_idle(
     """
     for effect in older:
         others = [e.label for e in best.added if e.label != effect.label]
-        fewer = trial.with_effects(
+        fewer = fitter.with_effects(
             baseline, [e for e in best.fit.vehicle.effects if e.label in others], best.view.disturbance
         )
         comparison = compare(fewer.predicted, best.predicted)
-        if not comparison.accepted and fewer.stands:
+        if not comparison.accepted and fewer.significant:
             best, judged = fewer, idle(judged, effect.label, others, comparison)
     return best, judged
 
 
 def after_all(
-    trial: Trial, base: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
-) -> tuple[Model, Judged, Found | None]:
+    fitter: ModelFitter,
+    base: Model,
+    found: Examination,
+    judged: Judged,
+    vocabulary: tuple[type[AbstractEffect], ...] | None,
+) -> tuple[Model, Judged, Examination | None]:
     """The model with names that seemed to say too little, what is to be said, and what is found from there.
 
     A name that a force without one seemed to beat, if it is of the same equation and its fit leaves no such force:
@@ -152,19 +158,19 @@ def after_all(
     which nothing then seems to have. Names that seemed to explain most and too little for the cause, if their fit does
     not: of what is large a linear picture leaves much, which is no disturbance. Else all is as it was.
     """
-    most = found.nameless is None and found.memory.correlated and found.memory.explained > MAJORITY
-    numbers = [one.number for one in found.naming.named]
-    here = numbers if most else [one.number for one in found.naming.named if found.nameless in one.effect.where][:1]
-    best, said = tried(trial, base, found, here, judged) if here else (base, judged)
+    most = found.nonparametric is None and found.memory.correlated and found.memory.explained > MAJORITY
+    named = found.naming.named
+    here = [one.number for one in (named if most else [o for o in named if found.nonparametric in o.effect.where][:1])]
+    best, said = accept_proposed(fitter, base, found, here, judged) if here else (base, judged)
     if not said.named:
         return base, judged, None
-    more = examine(best.view, vocabulary, trial.progress)
+    more = examine(best.view, vocabulary, fitter.progress)
     share = _explained(base, best, more)
-    stands = more.nameless is None and share >= EXPLAINED if most else more.nameless != found.nameless
+    stands = more.nonparametric is None and share >= EXPLAINED if most else more.nonparametric != found.nonparametric
     return (best, by_fit(said, share) if most else said, more) if stands else (base, judged, None)
 
 
-def _explained(base: Model, best: Model, found: Found) -> float:
+def _explained(base: Model, best: Model, found: Examination) -> float:
     """Of what a fit explains and of what the past tells beside it, as `found` from there, the fit's share."""
     gain = 2.0 * (evidence_of(best.view) - evidence_of(base.view))
     return share_of(gain, found.memory.told if found.memory.correlated else 0.0)

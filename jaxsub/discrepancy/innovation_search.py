@@ -1,7 +1,8 @@
 r"""Maximum likelihood by innovations: free parameters and a disturbance, in alternation.
 
-With the disturbance fixed, a step of the parameters is one of Gauss and Newton on the whitened innovations, damped where
-it must be (Levenberg 1944). With the parameters fixed, the disturbance is that of largest restricted likelihood.
+With the disturbance fixed, a step of the parameters is one of Gauss and Newton on the whitened innovations, damped
+where it must be (Levenberg 1944). With the parameters fixed, the disturbance is that of largest restricted
+likelihood.
 """
 
 import dataclasses
@@ -143,9 +144,9 @@ class InnovationSearch:
         """Alternations with as many scoring steps as gain under each disturbance, until the likelihood stays."""
         iterate = self._scored(iterate)
         for _ in range(_ALTERNATIONS):
-            tries = (self._scored(self.evaluate(iterate.vehicle, one)) for one in _disturbances(iterate))
+            tried = (self._scored(self.evaluate(iterate.vehicle, one)) for one in _disturbances(iterate))
             gains = lambda after, cost=iterate.likelihood_cost: cost - after.likelihood_cost >= _LEAST_GAIN
-            better = next(filter(gains, tries), None)
+            better = next(filter(gains, tried), None)
             if better is None:
                 break
             iterate = better
@@ -171,7 +172,7 @@ def _disturbances(iterate: Iterate) -> Iterator[Disturbance]:
 def _step(gram: np.ndarray, damped: float, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """The step of least squares between bounds, of the products (p + 1, p + 1) of a residual and its columns.
 
-    Cut off at a bound afterwards, it would be wrong in every parameter whose estimate is correlated with the bounded one.
+    A free step that is cut off at a bound would be wrong in every parameter correlated with the bounded one.
     """
     squares = gram[1:, 1:] + damped * np.eye(len(low))
     step = np.linalg.solve(squares, gram[1:, 0])

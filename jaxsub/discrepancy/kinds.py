@@ -18,8 +18,8 @@ from scipy import special
 
 from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument
 from ..vehicle import AbstractVehicle
+from .acceptance import Examination
 from .name import Named
-from .trial import Found
 from .view import View
 
 _FAMILIES = {"actuators": "actuator", "sensors": "sensor", "environment": "environment"}
@@ -45,7 +45,7 @@ def missing(named: Sequence[Named]) -> dict[str, float]:
     return _sorted({own: 1.0 - none for own, none in absent.items()})
 
 
-def leading(found: Found) -> dict[str, float]:
+def leading(found: Examination) -> dict[str, float]:
     """How probable each kind is as that of which a look at the recordings finds most."""
     selector, scan = found.selector, found.naming.first
     values, nothing = selector.freely_valued() if found.naming.again else (scan.value, selector.value([]))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import AbstractEffect
+from .acceptance import CandidateModels, Model, ModelFitter, proposed_effects, without_insignificant
 from .ahead import Ahead, lacking, proved
 from .cross_validation import Comparison, compare
 from .examine import listed, weighed
@@ -25,27 +26,26 @@ from .settings import (
     RIVALS_FITTED,
     SIGNIFICANCE,
 )
-from .trial import Model, Trial, Tries, upright, worth_trying
 from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
 
 
 def by_what_comes_next(
-    trial: Trial, base: Model, vocabulary: tuple[type[AbstractEffect], ...] | None
+    fitter: ModelFitter, base: Model, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged] | None:
     """The model with what the next sample asks for, and what is to be said, if it is accepted as a whole."""
-    ahead = Ahead(trial)
+    ahead = Ahead(fitter)
     search = _Search(ahead, ahead.begin(base), vocabulary)
     best, named = search.start, list[Named]()
     judged, fallen, refusals = NOTHING, set[str](), 0
     while len(best.added) < MOST_EFFECTS_ONE_STEP and refusals <= MOST_REJECTIONS:
         selector = search.listed(best)
         selector.usable[[effect.label in fallen for effect in selector.candidates]] = False
-        found = weighed(best.view, selector, trial.progress)
+        found = weighed(best.view, selector, fitter.progress)
         said = judge(found.naming, found.pattern, found.memory)
-        chosen = worth_trying(found, said)
+        chosen = proposed_effects(found, said)
         if not chosen:
             break
-        grown = search.grown(Tries(ahead.with_effects, best, found), chosen, named)
+        grown = search.grown(CandidateModels(ahead.with_effects, best, found), chosen, named)
         if grown is None:
             fallen.add(selector.candidates[chosen[0]].label)
             refusals += 1
@@ -55,7 +55,7 @@ def by_what_comes_next(
         fallen |= refused
         best, named = search.asked_again(best, named)
     best, named, gains = asked_for(ahead, search.start, best, named)
-    whole = proved(trial, base, best) if named else None
+    whole = proved(fitter, base, best) if named else None
     if whole is None:
         return None
     judged = settled(judged, named)
@@ -79,7 +79,7 @@ class _Search:
         return selector
 
     def grown(
-        self, tries: Tries, chosen: Sequence[int], named: Sequence[Named]
+        self, models: CandidateModels, chosen: Sequence[int], named: Sequence[Named]
     ) -> tuple[Model, list[Named], set[str]] | None:
         """The model with those of `chosen` and of what was `named` before that are accepted beside each other, if they
         gain, and the labels of those rejected; or with the first of them alone where the others lead astray.
@@ -87,12 +87,12 @@ class _Search:
         One that is rejected takes none of the others along. What is chosen first does most, and of what is so large a
         linear picture sees other things in its place.
         """
-        before = tries.model([])
+        before = models.model([])
         for some in [chosen, chosen[:1]][: len(chosen)]:
-            kept = upright(tries, some)
-            more = [*named, *standing(tries.found.selector, kept)]
-            model, stand, _ = asked_for(self.ahead, self.start, tries.model(kept), more)
-            if compare(before.predicted, model.predicted, model.stands).accepted:
+            kept = without_insignificant(models, some)
+            more = [*named, *standing(models.found.selector, kept)]
+            model, stand, _ = asked_for(self.ahead, self.start, models.model(kept), more)
+            if compare(before.predicted, model.predicted, model.significant).accepted:
                 return model, stand, {one.effect.label for one in more} - {one.effect.label for one in stand}
         return None
 
@@ -105,10 +105,10 @@ class _Search:
         for one in named:
             one, others = self._beside(best, every, one)
             tried = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
-            tried = [(effect, model) for effect, model in tried if model.admitted] or tried[:1]
+            tried = [(effect, model) for effect, model in tried if model.admissible] or tried[:1]
             values = told_apart([-float(model.fit.cost) for _, model in tried], [m.predicted for _, m in tried])
             fits = [(effect, model, value) for (effect, model), value in zip(tried, values, strict=True)]
-            effect, model, _ = max(fits, key=lambda fit: (fit[1].stands, fit[2]))
+            effect, model, _ = max(fits, key=lambda fit: (fit[1].significant, fit[2]))
             if model is best:
                 said.append(refitted(one, [(effect, value) for effect, _, value in fits]))
             else:

@@ -1,4 +1,4 @@
-"""Accepted effects joined to the model, and everything fitted again."""
+"""A model with added effects: its fit in simulation, and the tests of its parameters."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -19,38 +19,39 @@ from .view import View
 _NO_COLUMN = 1e-100
 
 
-def join(
+def fit_with(
     view: View,
     fit: Ended,
     effects: Sequence[AbstractEffect],
     file: AbstractVehicle,
     near: Sequence[AbstractVehicle] = (),
 ) -> Fit:
-    """The vehicle of `fit` with `effects` more, fitted again as it runs free: what it will be used for.
+    """The vehicle of `fit` with `effects` added, fitted in simulation: multi-start maximum likelihood.
 
-    The search begins at what innovations say of all numbers, and at the numbers of the `file`: those of a fit that had
-    to do without the effects may lie where nothing leads back, such as a rudder that steers the other way. Where
-    neither is better than that fit, it begins from the effects' predicted sizes or a tenth of them. It begins too at
-    vehicles with these effects that are `near` the answer. Searches that fall behind are given up. Numbers that are
-    not free in the fit stay as they are in it.
+    Starts are the parameters by innovations (`view`), those of the `file`, and the vehicles `near`: a fit without the
+    effects may be in an optimum that nothing leads out of, such as a rudder of the wrong sign. Where none of these is
+    better than `fit`, starts are its own parameters with the effects at their predicted sizes or a tenth of them.
+    Searches that fall behind are given up. Parameters that are not free in `fit` keep its values.
     """
     listed = {effect.label for effect in file.effects}
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
     values = fit.vehicle.values()
     held = {row.name: values[row.name] for row in fit.vehicle.layout.parameters if not row.free}
     raced = lambda starts: race([start.with_values(held).holding(held) for start in starts], fit.runs, fit.sigma)
-    best = raced([*near, joined(view.vehicle, effects, 1.0), joined(file, [*earlier, *effects], 1.0)])
+    best = raced(
+        [*near, with_scaled_effects(view.vehicle, effects, 1.0), with_scaled_effects(file, [*earlier, *effects], 1.0)]
+    )
     if not float(best.cost) < float(fit.cost):
-        best = by_cost([best, raced([joined(fit.vehicle, effects, share) for share in (1.0, 0.1)])])[0]
+        best = by_cost([best, raced([with_scaled_effects(fit.vehicle, effects, share) for share in (1.0, 0.1)])])[0]
     return evaluate(best)
 
 
-def freed(fit: Ended, start: AbstractVehicle) -> Fit:
+def refit(fit: Ended, start: AbstractVehicle) -> Fit:
     """The fit of `start` to the runs of a fit."""
     return evaluate(search(start, fit.runs, sigma=fit.sigma))
 
 
-def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: float) -> AbstractVehicle:
+def with_scaled_effects(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: float) -> AbstractVehicle:
     """`vehicle` with `effects`, their amplitudes scaled by `share`."""
     for effect in effects:
         scaled = {name: share * numbers(effect)[name] for name in amplitudes(effect)}
@@ -58,11 +59,11 @@ def joined(vehicle: AbstractVehicle, effects: Sequence[AbstractEffect], share: f
     return vehicle
 
 
-def sound(fit: Ended, effects: Sequence[AbstractEffect]) -> bool:
-    """Whether all of `effects` came out of a fit with signs that physics admits, and none of them vanished.
+def is_admissible(fit: Ended, effects: Sequence[AbstractEffect]) -> bool:
+    """Whether physics admits the fitted parameters of all `effects`, and none of them vanished.
 
-    A force whose memory is over within a sample is one without: what it then does, coefficients do. One whose memory
-    outlasts the runs is a constant in each, as large as the run's initial state, which is found anew for each.
+    A memory shorter than a sample acts as a coefficient does. One longer than the runs is a constant in each, as large
+    as the run's initial state, which is free.
     """
     labels, shortest = {effect.label for effect in effects}, float(np.min(np.asarray(fit.runs.steps)))
     longest = float(np.max(np.asarray(fit.runs.times)))
@@ -76,18 +77,19 @@ def sound(fit: Ended, effects: Sequence[AbstractEffect]) -> bool:
     return True
 
 
-def told(view: View, effects: Sequence[AbstractEffect]) -> bool:
-    """Whether the recordings tell each of `effects` from nothing, whatever all other numbers are."""
+def are_significant(view: View, effects: Sequence[AbstractEffect]) -> bool:
+    """Whether each of `effects` is significant (`p_value`), all other parameters free."""
     return all(p_value(view, effect) < SIGNIFICANCE for effect in effects)
 
 
 def p_value(view: View, effect: AbstractEffect) -> float:
-    r"""How probable so large an `effect` of a view's vehicle is where there is none.
+    r"""The p-value of an `effect` of a view's vehicle by Wald's test.
 
-    By the Wald statistic $a^T P^{-1} a$ of its amplitudes, which then is $\chi^2$, or of the numbers of an effect that
-    has no amplitude. One that changes nothing, such as a limit that nothing reaches, is not told, however large it is.
+    The statistic $a^T P^{-1} a$ of its amplitudes, or of the parameters of an effect that has none, is $\chi^2$ under
+    the null. It is 1 for an effect that changes nothing, such as a limit that nothing reaches.
     """
-    names, values, at = [row.name for row in view.vehicle.layout.free], view.vehicle.values(), places(view, effect)
+    names, values = [row.name for row in view.vehicle.layout.free], view.vehicle.values()
+    at = amplitude_indices(view, effect)
     columns = [np.asarray(part)[..., 1:][..., at] for part in jax.tree.leaves(view.base)]
     if all(np.max(np.abs(part)) < _NO_COLUMN for part in columns):
         return 1.0
@@ -96,13 +98,13 @@ def p_value(view: View, effect: AbstractEffect) -> float:
     return float(special.chdtrc(len(at), max(float(wald), 0.0)))
 
 
-def places(view: View, effect: AbstractEffect) -> list[int]:
-    """Where an effect's amplitudes, or its numbers if it has none, are among the free numbers of a view's vehicle."""
+def amplitude_indices(view: View, effect: AbstractEffect) -> list[int]:
+    """Indices of an effect's amplitudes, or of its parameters if it has none, among the vehicle's free parameters."""
     names, symbols = [row.name for row in view.vehicle.layout.free], effect.symbols()
     return [names.index(f"{effect.label}.{symbols[name]}") for name in amplitudes(effect) or symbols]
 
 
-def allowing_for(view: View, ended: Ended) -> Fit:
-    """The fit where a search ended, with errors of its numbers that allow for the disturbance that its view has."""
+def with_coloured_errors(view: View, ended: Ended) -> Fit:
+    """The fit where a search ended, with standard errors that allow for the view's disturbance."""
     fit = evaluate(ended)
     return dataclasses.replace(fit, covariance=coloured_covariance(fit, view.disturbance).covariance)

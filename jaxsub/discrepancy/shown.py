@@ -9,10 +9,10 @@ from jaxtyping import Float
 from ..estimate.assessment import Assessment
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
+from .acceptance import Model
 from .consistency import assessed, compared
 from .diagnosis import ChannelQuality, Explained, Gain, Remainder
 from .evaluation import Evaluation, evaluated, test_gain
-from .trial import Model
 from .validation import remainders
 
 

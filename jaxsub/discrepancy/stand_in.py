@@ -14,9 +14,10 @@ import numpy as np
 
 from ..effects import AbstractEffect, AbstractInstrument, parameter_table
 from ..likelihood import Disturbance
+from .acceptance import Examination, Model, ModelFitter
 from .cross_validation import compare
 from .examine import listed, weighed
-from .model import allowing_for, sound
+from .model import is_admissible, with_coloured_errors
 from .progress import OutOfTime
 from .selector import Selector
 from .settings import (
@@ -28,40 +29,47 @@ from .settings import (
     SURROGATE_INFLATION,
     SURROGATE_ROUNDS,
 )
-from .trial import Found, Model, Trial
 from .verdict import Judged, helped, incomplete, standing_in
 
 
 def described(
-    trial: Trial, named: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
+    fitter: ModelFitter,
+    named: Model,
+    found: Examination,
+    judged: Judged,
+    vocabulary: tuple[type[AbstractEffect], ...] | None,
 ) -> tuple[Model, Judged]:
     """A `named` model with what describes what has no name in the last look at it, and what is to be said.
 
     Where the time is spent before, it is the `named` model.
     """
     try:
-        return _described(trial, named, found, judged, vocabulary)
+        return _described(fitter, named, found, judged, vocabulary)
     except OutOfTime:
         return named, incomplete(judged)
 
 
 def _described(
-    trial: Trial, named: Model, found: Found, judged: Judged, vocabulary: tuple[type[AbstractEffect], ...] | None
+    fitter: ModelFitter,
+    named: Model,
+    found: Examination,
+    judged: Judged,
+    vocabulary: tuple[type[AbstractEffect], ...] | None,
 ) -> tuple[Model, Judged]:
     model, selector = named, found.selector
-    for _ in range(SURROGATE_ROUNDS if found.remains else 0):
-        more = _with_more(trial, named, model, selector)
+    for _ in range(SURROGATE_ROUNDS if found.unexplained else 0):
+        more = _with_more(fitter, named, model, selector)
         if more is None:
             break
         model, selector = more, listed(more.view, vocabulary)
     standing = model.added[len(named.added) :]
     if standing:
         judged = standing_in(judged, standing)
-        found = weighed(model.view, selector, trial.progress)
-    return _with_force(trial, named, model, found, judged)
+        found = weighed(model.view, selector, fitter.progress)
+    return _with_force(fitter, named, model, found, judged)
 
 
-def _with_more(trial: Trial, named: Model, model: Model, selector: Selector) -> Model | None:
+def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Selector) -> Model | None:
     """The model with what free runs ask for most, if it is accepted.
 
     What comes out of a fit with numbers that physics does not admit is asked for no more, and others instead; of what
@@ -71,8 +79,8 @@ def _with_more(trial: Trial, named: Model, model: Model, selector: Selector) -> 
     for _ in range(SURROGATE_FITS):
         if not asked:
             return None
-        more = _fitted(trial, named, model, asked, selector.evidence.best([])[1].disturbance)
-        wrong = {effect.label for effect in asked if not sound(more.fit, [effect])}
+        more = _fitted(fitter, named, model, asked, selector.evidence.best([])[1].disturbance)
+        wrong = {effect.label for effect in asked if not is_admissible(more.fit, [effect])}
         if wrong:
             selector.usable[[effect.label in wrong for effect in selector.candidates]] = False
             asked = freest(selector)
@@ -94,18 +102,18 @@ def _worth(model: Model, more: Model) -> bool:
 
 
 def _fitted(
-    trial: Trial, named: Model, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance
+    fitter: ModelFitter, named: Model, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance
 ) -> Model:
     """The model with some effects, in which what was named is known about as well as it was, or keeps its numbers."""
-    more = trial.with_effects(model, effects, disturbance)
+    more = fitter.with_effects(model, effects, disturbance)
     own = [row.name for effect in named.added for row in parameter_table(effect).values()]
     free = [name for name in own if name in more.fit.names]
-    if not free or not sound(more.fit, effects) or not float(more.fit.cost) < float(model.fit.cost):
+    if not free or not is_admissible(more.fit, effects) or not float(more.fit.cost) < float(model.fit.cost):
         return more
-    before, after = (allowing_for(one.view, one.fit).standard_errors for one in (named, more))
+    before, after = (with_coloured_errors(one.view, one.fit).standard_errors for one in (named, more))
     if all(after[name] < SURROGATE_INFLATION * before[name] for name in free):
         return more
-    return trial.with_effects(_holding(model, named, own), effects, disturbance)
+    return fitter.with_effects(_holding(model, named, own), effects, disturbance)
 
 
 def _holding(model: Model, named: Model, names: Sequence[str]) -> Model:
@@ -135,7 +143,9 @@ def freest(selector: Selector) -> list[AbstractEffect]:
     return [effect for effect, admitted in beside if admitted]
 
 
-def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: Judged) -> tuple[Model, Judged]:
+def _with_force(
+    fitter: ModelFitter, named: Model, base: Model, found: Examination, judged: Judged
+) -> tuple[Model, Judged]:
     """The model with the force without a name, if it is accepted.
 
     How far from zero it is was asked of its shape in detail, and its few knots may overdo it: so half of that is tried,
@@ -147,8 +157,8 @@ def _with_force(trial: Trial, named: Model, base: Model, found: Found, judged: J
     last = np.inf
     for share in FORCE_SPREADS:
         less = dataclasses.replace(force, spread=share * force.spread)
-        more = _fitted(trial, named, base, [less], disturbance)
-        gain = compare(base.predicted, more.predicted, more.admitted)
+        more = _fitted(fitter, named, base, [less], disturbance)
+        gain = compare(base.predicted, more.predicted, more.admissible)
         if gain.accepted and more.view.finite:
             return more, helped(judged, less.label, gain)
         if gain.ratio > last:

@@ -8,6 +8,7 @@ import numpy as np
 from rigs import oscillator
 
 from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.acceptance import Model, ModelFitter
 from jaxsub.discrepancy.ahead import Ahead, in_pieces, lacking, pieces_of
 from jaxsub.discrepancy.cross_validation import Predicted, one_step_ahead
 from jaxsub.discrepancy.evaluation import evaluated
@@ -18,7 +19,6 @@ from jaxsub.discrepancy.many import asked_for, by_what_comes_next
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.restarts import restarted
 from jaxsub.discrepancy.settings import BLOCKS
-from jaxsub.discrepancy.trial import Model, Trial
 from jaxsub.discrepancy.view import led_from
 from jaxsub.effects import CubicStiffness, numbers
 from jaxsub.effects.actuator_curves import ActuatorDeadband
@@ -150,13 +150,13 @@ def begun():
     start, cost = initial_guess(view.vehicle, train)[0], jnp.asarray(-evidence_of(view))
     fit = Ended(view.vehicle, train, start, SIGMA, cost, jnp.asarray(0), RESULTS.nan_start)
     lost = Predicted(one_step_ahead(view), np.full(2 * BLOCKS, -np.inf))
-    return Trial(lambda message: None, file), Model(fit, view, lost, ())
+    return ModelFitter(lambda message: None, file), Model(fit, view, lost, ())
 
 
 def test_what_is_not_asked_for_takes_nothing_else_along():
     """Claim: of two effects that are there and one that is not, only that one leaves the model."""
-    trial, base = begun()
-    ahead = Ahead(trial)
+    fitter, base = begun()
+    ahead = Ahead(fitter)
     start = ahead.begin(base)
     there = [QuadraticDamping("x", jnp.asarray(-0.5)), CubicStiffness("x", jnp.asarray(2.0))]
     effects = [CubicDamping("x", jnp.asarray(-0.1)), *there]
@@ -170,9 +170,9 @@ def test_what_is_not_asked_for_takes_nothing_else_along():
 def test_what_falls_over_is_known_by_what_comes_next():
     """Claim: from a file 15 % off, whose free run is lost, damping and spring are named, within three errors of the
     truth, and free runs through the held-out run err far less."""
-    trial, base = begun()
+    fitter, base = begun()
     vocabulary = (QuadraticDamping, CubicDamping, CubicStiffness, ActuatorDeadband)
-    best, judged = by_what_comes_next(trial, base, vocabulary)
+    best, judged = by_what_comes_next(fitter, base, vocabulary)
     assert sorted(one.effect.name for one in judged.named) == ["cubic-stiffness", "quadratic-damping"]
     errors = dict(
         zip([row.name for row in best.view.vehicle.layout.free], np.sqrt(np.diag(best.view.covariance)), strict=True)

@@ -7,12 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter, proposed_effects
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
 from jaxsub.discrepancy.evidence import Products
 from jaxsub.discrepancy.explain import without_idle
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.selector import Scan, Selector
-from jaxsub.discrepancy.trial import Found, Model, Trial, worth_trying
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.likelihood import Disturbance
@@ -108,15 +108,15 @@ def test_what_stood_in_for_a_later_effect_is_left_out(monkeypatch, kept):
     old, new = CubicDamping("yaw", -0.5), QuadraticDamping("surge", -0.5)
     fit = SimpleNamespace(vehicle=SimpleNamespace(effects=(old, new)))
     best, fewer = Model(fit, SimpleNamespace(disturbance=None), None, (old, new)), Model(fit, None, None, (new,))
-    trial, asked = object.__new__(Trial), []
+    fitter, asked = object.__new__(ModelFitter), []
     fitted = lambda base, effects, disturbance: asked.append(effects) or fewer
-    object.__setattr__(trial, "with_effects", fitted)
+    object.__setattr__(fitter, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.explain"]
     said = Comparison(Gain(1.0, 1.0 - kept, float(kept)), Gain(0.0, 1.0, 1.0), 1.0, True)
     monkeypatch.setattr(path, "compare", lambda before, after: said)
     monkeypatch.setattr(Model, "stands", True)
     judged = Judged("named", [Named(0, old, 1.0, [], []), Named(1, new, 1.0, [], [])], 1e-9, [])
-    model, after = without_idle(trial, Model(None, None, None, ()), best, judged, [old])
+    model, after = without_idle(fitter, Model(None, None, None, ()), best, judged, [old])
     assert asked == [[new]]
     assert model is (best if kept else fewer)
     assert [one.effect for one in after.named] == ([old, new] if kept else [new])
@@ -128,13 +128,13 @@ def test_what_stood_in_for_a_later_effect_is_left_out(monkeypatch, kept):
 )
 def test_what_rules_gives_way_to_a_force_without_a_name(monkeypatch, nameless, chosen, expected):
     """Claim: of 0.7 of a free run, to one that explains any more where it was not chosen, else to one much nearer."""
-    path = sys.modules["jaxsub.discrepancy.trial"]
+    path = sys.modules["jaxsub.discrepancy.acceptance"]
     monkeypatch.setattr(path, "most_explained", lambda *_: nameless)
     asked = Freely(0.1, 0.7)
     asked.ruling, asked.free = lambda: np.array([0.0, 0.7]), SimpleNamespace(disturbance=None)
-    found = object.__new__(Found)
+    found = object.__new__(Examination)
     named = SimpleNamespace(named=[SimpleNamespace(number=i) for i in chosen])
     for part, value in {"naming": named, "selector": asked, "view": None}.items():
         object.__setattr__(found, part, value)
-    assert worth_trying(found, Judged("unknown", [], 1e-9, [])) == expected
+    assert proposed_effects(found, Judged("unknown", [], 1e-9, [])) == expected
     assert asked.freely == {*expected}

@@ -14,12 +14,20 @@ from experiments.concealed_physics.plan import cases
 from experiments.next_manoeuvre.cases import case
 from jaxsub.cli.runs import load_runs
 from jaxsub.discrepancy import batch, diagnose
+from jaxsub.discrepancy.acceptance import (
+    CandidateModels,
+    Examination,
+    Model,
+    ModelFitter,
+    accept_jointly,
+    accept_singly,
+    dominant,
+)
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
 from jaxsub.discrepancy.explain import after_all
-from jaxsub.discrepancy.model import join, told
+from jaxsub.discrepancy.model import are_significant, fit_with
 from jaxsub.discrepancy.name import Named, refitted
 from jaxsub.discrepancy.selector import Selector
-from jaxsub.discrepancy.trial import Found, Model, Trial, Tries, alone, leading, together
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM, Memory
@@ -82,8 +90,8 @@ def test_a_fit_with_more_effects_is_sought_from_the_file_too():
     runs = batch(wrong(), recorded(SensorScale("q", 0.05), 2)[:2])
     gone = astray(runs, -1.0, "M_delta_s", "M_q", "M_w")
     view, effects = look(gone), [SensorScale("q", 0.02)]
-    assert max(join(view, gone, effects, gone.vehicle).rms.values()) > 2.0
-    found = join(view, gone, effects, wrong())
+    assert max(fit_with(view, gone, effects, gone.vehicle).rms.values()) > 2.0
+    found = fit_with(view, gone, effects, wrong())
     assert max(found.rms.values()) < 1.1
     assert float(found.vehicle.values()["sensor-scale[q].scale"]) == pytest.approx(0.05, rel=0.2)
 
@@ -105,9 +113,9 @@ def test_what_is_there_is_told_and_what_is_not_is_not():
     scale, asymmetry = SensorScale("q", 0.02), HullAsymmetry("pitch", 0.1)
     runs = batch(wrong(), recorded(SensorScale("q", 0.05), 1)[:2])
     view = look(fit(wrong().with_effect(scale).with_effect(asymmetry), runs))
-    assert told(view, [scale])
-    assert not told(view, [asymmetry])
-    assert not told(view, [scale, asymmetry])
+    assert are_significant(view, [scale])
+    assert not are_significant(view, [asymmetry])
+    assert not are_significant(view, [scale, asymmetry])
 
 
 @pytest.mark.parametrize("rate", [1e30, 1e261])
@@ -115,10 +123,10 @@ def test_a_limit_that_nothing_reaches_is_not_told(rate):
     """Claim: a rate limit far beyond all commands changes nothing, and so its size says nothing for it."""
     limit = ActuatorRateLimit(dsrv().layout.inputs[0][0], rate)
     runs = batch(wrong(), recorded(None, 1)[:2])
-    assert not told(look(fit(wrong().with_effect(limit), runs)), [limit])
+    assert not are_significant(look(fit(wrong().with_effect(limit), runs)), [limit])
 
 
-class Fitted(Tries):
+class Fitted(CandidateModels):
     """A candidate 0 and its twins 1, 2 and 3: the evidence of their fits, and which are accepted.
 
     2 has a sign that physics forbids, and 3 is not told.
@@ -131,74 +139,74 @@ class Fitted(Tries):
     def model(self, numbers):
         return SimpleNamespace(predicted=None)
 
-    def sound(self, numbers):
+    def is_significant(self, numbers):
         return numbers[0] in (0, 1)
 
-    def helps(self, fewer, more):
-        assert self.sound([more])
+    def accepts(self, fewer, more):
+        assert self.is_significant([more])
         return more in self.asked
 
 
 def test_a_twin_that_is_rejected_gives_way_to_the_next(monkeypatch):
     """Claim: the most probable that stands is taken, what was refused before is no rival, what is not told is one."""
-    path = sys.modules["jaxsub.discrepancy.trial"]
+    path = sys.modules["jaxsub.discrepancy.acceptance"]
     monkeypatch.setattr(path, "named_on", lambda *_: SimpleNamespace(twins=[1, 2, 3]))
     monkeypatch.setattr(path, "told_apart", lambda evidence, predicted: evidence)
     untold = [(3, 31.0), (2, -np.inf)]
-    assert alone(Fitted(), [0]) == {}
-    assert alone(Fitted(1), [0]) == {1: [(1, 20.0), *untold]}
-    assert alone(Fitted(0, 1), [0]) == {0: [(0, 30.0), (1, 20.0), *untold]}
+    assert accept_singly(Fitted(), [0]) == {}
+    assert accept_singly(Fitted(1), [0]) == {1: [(1, 20.0), *untold]}
+    assert accept_singly(Fitted(0, 1), [0]) == {0: [(0, 30.0), (1, 20.0), *untold]}
 
 
 @pytest.mark.parametrize("admitted", [True, False])
 def test_a_fit_that_physics_admits_has_evidence_whether_it_is_told_or_not(monkeypatch, admitted):
     """Claim: what is not told from nothing has the evidence of its fit, and what physics forbids has none."""
-    path = sys.modules["jaxsub.discrepancy.trial"]
-    for name, answer in (("evidence_of", 7.0), ("told", False), ("sound", admitted)):
+    path = sys.modules["jaxsub.discrepancy.acceptance"]
+    for name, answer in (("evidence_of", 7.0), ("are_significant", False), ("sound", admitted)):
         monkeypatch.setattr(path, name, lambda *_, answer=answer: answer)
-    tries = object.__new__(Tries)
-    tries.found = SimpleNamespace(naming=SimpleNamespace(products=SimpleNamespace(disturbance=None)))
-    tries.models, tries.values = {(0,): Model(None, None, None, ())}, {}
-    assert not tries.sound([0])
-    assert tries.value([0]) == (7.0 if admitted else -np.inf)
+    models = object.__new__(CandidateModels)
+    models.found = SimpleNamespace(naming=SimpleNamespace(products=SimpleNamespace(disturbance=None)))
+    models.by_numbers, models.values = {(0,): Model(None, None, None, ())}, {}
+    assert not models.is_significant([0])
+    assert models.log_evidence([0]) == (7.0 if admitted else -np.inf)
 
 
-class Sets(Tries):
+class Sets(CandidateModels):
     """Candidates of which one set is the truth: the others are not told, nor are two that trade, nor do fewer help."""
 
     def __init__(self, truth, trading=()):
         self.truth, self.trading, self.fitted = truth, {*trading}, []
 
-    def unsound(self, numbers):
+    def insignificant(self, numbers):
         self.fitted.append(sorted(numbers))
         untold = {*numbers} - self.truth | (self.trading if self.trading <= {*numbers} else set())
         return sorted(untold, reverse=True)
 
-    def closest(self, others, index):
+    def alternatives(self, others, index):
         return [(index, 0.0)]
 
-    def compared(self, fewer, more):
+    def comparison(self, fewer, more):
         chance = 0.001 if self.truth <= {*more} else 1.0
         return Comparison(Gain(9.0, chance, 1.0), Gain(9.0, chance, 1.0), 0.5, True)
 
-    def helps(self, fewer, more):
+    def accepts(self, fewer, more):
         return more in self.truth
 
 
 def test_of_several_those_that_no_fit_bears_out_are_left_out():
     """Claim: two of four that are there are kept after a second fit, one of two that trade, and none of none."""
-    tries = Sets({0, 3})
-    assert together(tries, [0, 1, 2, 3]) == {0: [(0, 0.0)], 3: [(3, 0.0)]}
-    assert tries.fitted == [[0, 1, 2, 3], [0, 3]]
-    tries = Sets({0}, trading=(0, 1))
-    assert set(together(tries, [0, 1])) == {0}
-    assert tries.fitted == [[0, 1], [0]]
-    assert together(Sets({0, 5}), [0, 1]) == {}
+    models = Sets({0, 3})
+    assert accept_jointly(models, [0, 1, 2, 3]) == {0: [(0, 0.0)], 3: [(3, 0.0)]}
+    assert models.fitted == [[0, 1, 2, 3], [0, 3]]
+    models = Sets({0}, trading=(0, 1))
+    assert set(accept_jointly(models, [0, 1])) == {0}
+    assert models.fitted == [[0, 1], [0]]
+    assert accept_jointly(Sets({0, 5}), [0, 1]) == {}
 
 
 def looked(naming, pattern=None, memory=RANDOM):
     """A look at recordings of which only what was named, the force without a name and what is left matter."""
-    found = object.__new__(Found)
+    found = object.__new__(Examination)
     parts = {"naming": naming, "pattern": pattern, "memory": memory, "view": None, "selector": None}
     for name, value in parts.items():
         object.__setattr__(found, name, value)
@@ -207,8 +215,8 @@ def looked(naming, pattern=None, memory=RANDOM):
 
 def silent():
     """A trial of which only the progress is asked."""
-    trial = object.__new__(Trial)
-    object.__setattr__(trial, "progress", lambda message: None)
+    fitter = object.__new__(ModelFitter)
+    object.__setattr__(fitter, "progress", lambda message: None)
     return trial
 
 
@@ -223,7 +231,7 @@ class Asked:
         self.result = result
         path = sys.modules["jaxsub.discrepancy.explain"]
 
-        def next_asked(trial, base, vocabulary):
+        def next_asked(fitter, base, vocabulary):
             self.ahead.append(self.tried)
             return None if ahead is None else (base, ahead)
 
@@ -243,7 +251,7 @@ class Asked:
         object.__setattr__(found, "selector", self.selector)
         return found
 
-    def try_one(self, trial, best, found, chosen, judged):
+    def try_one(self, fitter, best, found, chosen, judged):
         self.tried += 1
         return best, self.answers.pop(0)
 
@@ -302,15 +310,15 @@ class Weighed(Selector):
 
 def test_what_alone_says_nearly_all_is_tried_first_and_alone():
     """Claim: at 92 % of the gain one leads whichever place it was chosen in, at 62 % they are tried together."""
-    assert leading(Weighed({(0,): 58.0, (1,): 792.0, (0, 1): 862.0}), [0, 1]) == [1]
-    assert leading(Weighed({(0,): 123.0, (1,): 20.0, (0, 1): 198.0}), [0, 1]) == []
-    assert leading(Weighed({(3,): 40.0}), [3]) == [3]
+    assert dominant(Weighed({(0,): 58.0, (1,): 792.0, (0, 1): 862.0}), [0, 1]) == [1]
+    assert dominant(Weighed({(0,): 123.0, (1,): 20.0, (0, 1): 198.0}), [0, 1]) == []
+    assert dominant(Weighed({(3,): 40.0}), [3]) == [3]
 
 
 def fitted_to(monkeypatch, model, said, after, asked):
     """Every trial ends at `model` with what is `said`, and a look there sees `after`; what was asked is kept."""
 
-    def stand(trial, base, found, chosen, judged):
+    def stand(fitter, base, found, chosen, judged):
         asked.append(chosen)
         return model, said
 
@@ -333,12 +341,12 @@ def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monk
 
     path = fitted_to(monkeypatch, better, named, after, asked)
     monkeypatch.setattr(path, "evidence_of", lambda view: 0.0)
-    trial = silent()
-    found = after_all(trial, base, seen("roll", yaw, roll), unknown, None)
+    fitter = silent()
+    found = after_all(fitter, base, seen("roll", yaw, roll), unknown, None)
     assert asked == [[7]]
     assert found == ((better, named, after) if stands else (base, unknown, None))
-    assert after_all(trial, base, seen("surge", yaw, roll), unknown, None) == (base, unknown, None)
-    assert after_all(trial, base, seen(None, yaw, roll), unknown, None) == (base, unknown, None)
+    assert after_all(fitter, base, seen("surge", yaw, roll), unknown, None) == (base, unknown, None)
+    assert after_all(fitter, base, seen(None, yaw, roll), unknown, None) == (base, unknown, None)
     assert asked == [[7]]
 
 
@@ -371,14 +379,14 @@ def test_names_that_say_most_by_a_linear_picture_are_asked_by_their_fit(monkeypa
 def test_a_fit_of_fewer_effects_begins_also_where_that_of_more_ended():
     """Claim: at the best vehicle with all of them and others, less the others; at none where no fit had them all."""
     drag, lift, scale = QuadraticDamping("sway", -1.0), CubicDamping("yaw", -1.0), SensorScale("psi", 0.1)
-    tries = object.__new__(Tries)
-    tries.found = looked(None)
-    object.__setattr__(tries.found, "selector", SimpleNamespace(candidates=[drag, lift, scale]))
+    models = object.__new__(CandidateModels)
+    models.found = looked(None)
+    object.__setattr__(models.found, "selector", SimpleNamespace(candidates=[drag, lift, scale]))
     of = lambda cost, *effects: SimpleNamespace(fit=SimpleNamespace(cost=cost, vehicle=with_all(effects)))
     with_all = lambda effects: functools.reduce(lambda vehicle, effect: vehicle.with_effect(effect), effects, dsrv())
-    tries.models = {(): of(9.0), (0, 1): of(5.0, drag, lift), (0, 1, 2): of(2.0, drag, lift, scale)}
-    assert [[effect.label for effect in near.effects] for near in tries._near((0,))] == [[drag.label]]
-    assert tries._near((0,))[0].effects[0] is tries.models[0, 1, 2].fit.vehicle.effects[0]
-    assert [effect.label for effect in tries._near((1, 2))[0].effects] == [lift.label, scale.label]
-    assert tries._near((0, 1, 2)) == []
-    assert tries._near(()) == []
+    models.by_numbers = {(): of(9.0), (0, 1): of(5.0, drag, lift), (0, 1, 2): of(2.0, drag, lift, scale)}
+    assert [[effect.label for effect in near.effects] for near in models._near((0,))] == [[drag.label]]
+    assert models._near((0,))[0].effects[0] is models.by_numbers[0, 1, 2].fit.vehicle.effects[0]
+    assert [effect.label for effect in models._near((1, 2))[0].effects] == [lift.label, scale.label]
+    assert models._near((0, 1, 2)) == []
+    assert models._near(()) == []

@@ -14,7 +14,7 @@ from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.columns import candidate_columns, plausible, sensor_changes
 from jaxsub.discrepancy.evidence import Evidence, Products, evidence_of
 from jaxsub.discrepancy.locate import effect_shares
-from jaxsub.discrepancy.model import sound
+from jaxsub.discrepancy.model import is_admissible
 from jaxsub.discrepancy.name import select
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.view import facts, look
@@ -185,7 +185,7 @@ def test_an_instrument_is_one_column_in_all_its_channels_and_its_trace_is_theirs
 def test_a_memory_within_a_sample_or_beyond_the_runs_or_that_drives_is_unsound(fitted, samples, coefficient, stands):
     memory = FluidMemory("pitch", coefficient, samples * INTERVAL)
     found = dataclasses.replace(fitted, vehicle=fitted.vehicle.with_effect(memory))
-    assert sound(found, [memory]) is stands
+    assert is_admissible(found, [memory]) is stands
 
 
 def test_a_view_is_the_same_from_wherever_its_disturbance_is_sought():

@@ -7,11 +7,11 @@ import pytest
 from diagnosis_cases import disturbed, recorded, wrong
 
 from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.acceptance import Examination
 from jaxsub.discrepancy.examine import examine, listed
 from jaxsub.discrepancy.kinds import leading, missing, right
-from jaxsub.discrepancy.model import join
+from jaxsub.discrepancy.model import fit_with
 from jaxsub.discrepancy.name import Named
-from jaxsub.discrepancy.trial import Found
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import ActuatorLag, CrossflowDrag, Current, SensorScale
 from jaxsub.estimate import fit
@@ -39,7 +39,7 @@ def test_what_leads_is_of_the_kind_that_was_concealed(kind):
     said = leading(found)
     assert next(iter(said)) == kind and said[kind] > 0.95
     assert np.isclose(sum(said.values()), 1.0)
-    with_it = look(join(view, start, [effect], wrong()))
+    with_it = look(fit_with(view, start, [effect], wrong()))
     assert right(with_it, dsrv()) > 1e-3
     assert right(with_it, wrong()) < 1e-6
 
@@ -64,7 +64,7 @@ def test_where_a_free_run_asked_the_kind_is_what_it_asked_for():
     )
 
     def first(again):
-        found = object.__new__(Found)
+        found = object.__new__(Examination)
         found.__dict__.update(selector=selector, pattern=None, naming=SimpleNamespace(first=scan, again=again))
         return next(iter(leading(found)))
 

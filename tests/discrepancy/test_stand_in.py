@@ -9,12 +9,12 @@ import pytest
 from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
 from jaxsub.discrepancy.generic import Pattern
-from jaxsub.discrepancy.model import join
+from jaxsub.discrepancy.model import fit_with
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.stand_in import described, freest
-from jaxsub.discrepancy.trial import Found, Model, Trial
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM, Memory
@@ -52,7 +52,7 @@ def test_stands_in_what_moves_the_vehicle_and_explains_enough_of_free_runs():
 
 def seen(selector, memory, pattern=None, disturbance=None):
     """A last look at recordings, of which only the selector, what is left and a force without a name matter."""
-    found = object.__new__(Found)
+    found = object.__new__(Examination)
     naming = SimpleNamespace(products=SimpleNamespace(disturbance=disturbance))
     parts = {"naming": naming, "pattern": pattern, "memory": memory, "view": None, "selector": selector}
     for name, value in parts.items():
@@ -87,8 +87,8 @@ def test_a_description_joins_where_it_explains_some_of_what_is_left(
     selector = Freely([surge, yaw], shares, admitted, named.view.disturbance)
     fit_of = dataclasses.replace(found, cost=cost * found.cost)
     led = dataclasses.replace(named.view, covariance=known * named.view.covariance)
-    fitted = lambda trial, model, effects, _: model._replace(fit=fit_of, view=led, added=(*model.added, *effects))
-    monkeypatch.setattr(Trial, "with_effects", fitted)
+    fitted = lambda fitter, model, effects, _: model._replace(fit=fit_of, view=led, added=(*model.added, *effects))
+    monkeypatch.setattr(ModelFitter, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
     again = Freely([], [()], lambda *_: True)
     fakes = {
@@ -99,9 +99,9 @@ def test_a_description_joins_where_it_explains_some_of_what_is_left(
     }
     for name, fake in fakes.items():
         monkeypatch.setattr(path, name, fake)
-    trial = object.__new__(Trial)
-    object.__setattr__(trial, "progress", lambda message: None)
-    best, said = described(trial, named, seen(selector, Memory(left, 1.0)), Judged("unknown", [], 1e-9, []), None)
+    fitter = object.__new__(ModelFitter)
+    object.__setattr__(fitter, "progress", lambda message: None)
+    best, said = described(fitter, named, seen(selector, Memory(left, 1.0)), Judged("unknown", [], 1e-9, []), None)
     assert best.added == ((surge,) if stands else ())
     assert (best is named) is not stands
     assert said.verdict == "unknown"
@@ -129,19 +129,19 @@ def test_a_force_that_overdoes_it_is_tried_by_halves(monkeypatch, most, worse, a
     named = Model(found, look(found), None, ())
     spreads = []
 
-    def fitted(trial, model, effects, disturbance):
+    def fitted(fitter, model, effects, disturbance):
         spreads.append(effects[0].spread)
         return model._replace(predicted=effects[0].spread, added=tuple(effects))
 
     def gained(before, after, admissible):
         return Comparison(Gain(1.0, 1e-3 if after < most else 1.0, 0.5), NO_GAIN, 1.0 + worse / after, admissible)
 
-    monkeypatch.setattr(Trial, "with_effects", fitted)
+    monkeypatch.setattr(ModelFitter, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
     monkeypatch.setattr(path, "compare", gained)
-    trial = object.__new__(Trial)
+    fitter = object.__new__(ModelFitter)
     left = seen(Freely([], [()], lambda *_: True), Memory(1e-9, 1.0), pattern, named.view.disturbance)
-    best, said = described(trial, named, left, Judged("unknown", [], 1e-9, []), None)
+    best, said = described(fitter, named, left, Judged("unknown", [], 1e-9, []), None)
     assert spreads == asked
     assert [effect.spread for effect in best.added] == ([] if stands is None else [stands])
     assert (best is named) is (stands is None)
@@ -157,22 +157,22 @@ def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, er
     own = next(name for name in found.names if name.startswith("hull-asymmetry"))
     started = []
 
-    def fitted(trial, model, effects, disturbance):
+    def fitted(fitter, model, effects, disturbance):
         row = next(row for row in model.fit.vehicle.layout.parameters if row.name == own)
         started.append(row.free)
         cheaper = dataclasses.replace(found, cost=0.5 * found.cost, covariance=errors**2 * found.covariance)
         return model._replace(fit=cheaper, added=(*model.added, *effects))
 
-    monkeypatch.setattr(Trial, "with_effects", fitted)
+    monkeypatch.setattr(ModelFitter, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
     monkeypatch.setattr(path, "allowing_for", lambda view, fit: fit)
     monkeypatch.setattr(path, "compare", lambda *given: Comparison(Gain(1.0, 1e-3, 0.999), NO_GAIN, 0.5, True))
     monkeypatch.setattr(path, "listed", lambda *_: Freely([], [()], lambda *_: True))
     monkeypatch.setattr(path, "weighed", lambda *_: seen(None, RANDOM))
     selector = Freely([drag], [(0.3,), (0.0,)], lambda *_: True, named.view.disturbance)
-    trial = object.__new__(Trial)
-    object.__setattr__(trial, "progress", lambda message: None)
-    best, _ = described(trial, named, seen(selector, Memory(1e-9, 1.0)), Judged("named", [], 1e-9, []), None)
+    fitter = object.__new__(ModelFitter)
+    object.__setattr__(fitter, "progress", lambda message: None)
+    best, _ = described(fitter, named, seen(selector, Memory(1e-9, 1.0)), Judged("named", [], 1e-9, []), None)
     assert best.added == (effect, drag)
     assert started == [True, False][: 1 + holds]
 
@@ -183,7 +183,7 @@ def test_numbers_that_are_held_stay_through_every_search():
     vehicle = wrong().with_effect(HullAsymmetry("pitch", 250.0))
     own = next(row.name for row in vehicle.layout.free if row.name.startswith("hull-asymmetry"))
     found = fit(vehicle.holding([own]), runs)
-    more = join(look(found), found, [QuadraticDamping("heave", -1.0)], wrong())
+    more = fit_with(look(found), found, [QuadraticDamping("heave", -1.0)], wrong())
     assert own not in more.names
     assert float(more.vehicle.values()[own]) == 250.0
     assert any(name.startswith("quadratic-damping") for name in more.names)

@@ -9,8 +9,8 @@ import pytest
 from rigs import driven, oscillator
 
 from jaxsub.discrepancy import batch
+from jaxsub.discrepancy.acceptance import ModelFitter, fitted_model
 from jaxsub.discrepancy.stiffness import FINEST, fastest, substeps_for, substeps_unseen
-from jaxsub.discrepancy.trial import Trial, fitted_model
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import CubicStiffness, QuadraticDamping
 from jaxsub.effects.memory import Hysteresis
@@ -97,8 +97,8 @@ def test_an_effect_that_turns_within_a_sample_is_fitted_with_its_own_numbers():
     runs = batch(plain, bent())
     found = fit(plain, runs.take([0, 1], 2))
     view = look(found)
-    trial, base = Trial(lambda message: None, plain), fitted_model(found, view, ())
-    made = trial.with_effects(base, [Hysteresis("x", jnp.asarray(0.3), jnp.asarray(0.3))], view.disturbance)
+    fitter, base = ModelFitter(lambda message: None, plain), fitted_model(found, view, ())
+    made = fitter.with_effects(base, [Hysteresis("x", jnp.asarray(0.3), jnp.asarray(0.3))], view.disturbance)
     assert runs.substeps == 1 < made.fit.runs.substeps
     ended = evaluate(made.fit)
     for name, true in {"hysteresis[x].F_h": 0.5, "hysteresis[x].x_y": 0.1}.items():
