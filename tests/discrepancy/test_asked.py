@@ -114,7 +114,7 @@ def test_what_stood_in_for_a_later_effect_is_left_out(monkeypatch, kept):
     path = sys.modules["jaxsub.discrepancy.explain"]
     said = Comparison(Gain(1.0, 1.0 - kept, float(kept)), Gain(0.0, 1.0, 1.0), 1.0, True)
     monkeypatch.setattr(path, "compare", lambda before, after: said)
-    monkeypatch.setattr(Model, "stands", True)
+    monkeypatch.setattr(Model, "significant", True)
     judged = Judged("named", [Named(0, old, 1.0, [], []), Named(1, new, 1.0, [], [])], 1e-9, [])
     model, after = without_idle(fitter, Model(None, None, None, ()), best, judged, [old])
     assert asked == [[new]]

@@ -162,7 +162,7 @@ def test_a_twin_that_is_rejected_gives_way_to_the_next(monkeypatch):
 def test_a_fit_that_physics_admits_has_evidence_whether_it_is_told_or_not(monkeypatch, admitted):
     """Claim: what is not told from nothing has the evidence of its fit, and what physics forbids has none."""
     path = sys.modules["jaxsub.discrepancy.acceptance"]
-    for name, answer in (("evidence_of", 7.0), ("are_significant", False), ("sound", admitted)):
+    for name, answer in (("evidence_of", 7.0), ("are_significant", False), ("is_admissible", admitted)):
         monkeypatch.setattr(path, name, lambda *_, answer=answer: answer)
     models = object.__new__(CandidateModels)
     models.found = SimpleNamespace(naming=SimpleNamespace(products=SimpleNamespace(disturbance=None)))
@@ -214,10 +214,10 @@ def looked(naming, pattern=None, memory=RANDOM):
 
 
 def silent():
-    """A trial of which only the progress is asked."""
+    """A fitter of which only the progress is asked."""
     fitter = object.__new__(ModelFitter)
     object.__setattr__(fitter, "progress", lambda message: None)
-    return trial
+    return fitter
 
 
 class Asked:
@@ -237,8 +237,8 @@ class Asked:
 
         fakes = {
             "judge": lambda *_: Judged("named", [], 1e-9, []),
-            "worth_trying": lambda found, judged: [0] if self.answers else [],
-            "tried": self.try_one,
+            "proposed_effects": lambda found, judged: [0] if self.answers else [],
+            "accept_proposed": self.try_one,
             "weighed": lambda *_: self.found(),
             "by_what_comes_next": next_asked,
         }
@@ -323,7 +323,7 @@ def fitted_to(monkeypatch, model, said, after, asked):
         return model, said
 
     path = sys.modules["jaxsub.discrepancy.explain"]
-    monkeypatch.setattr(path, "tried", stand)
+    monkeypatch.setattr(path, "accept_proposed", stand)
     monkeypatch.setattr(path, "examine", lambda *_: after)
     return path
 

@@ -92,7 +92,7 @@ def test_a_description_joins_where_it_explains_some_of_what_is_left(
     path = sys.modules["jaxsub.discrepancy.stand_in"]
     again = Freely([], [()], lambda *_: True)
     fakes = {
-        "sound": lambda fit, effects: effects[0] is not yaw,
+        "is_admissible": lambda fit, effects: effects[0] is not yaw,
         "compare": lambda before, after: Comparison(NO_GAIN, Gain(1.0, chance, 1.0 - chance), free, True),
         "listed": lambda *_: again,
         "weighed": lambda *_: seen(again, RANDOM),
@@ -165,7 +165,7 @@ def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, er
 
     monkeypatch.setattr(ModelFitter, "with_effects", fitted)
     path = sys.modules["jaxsub.discrepancy.stand_in"]
-    monkeypatch.setattr(path, "allowing_for", lambda view, fit: fit)
+    monkeypatch.setattr(path, "with_coloured_errors", lambda view, fit: fit)
     monkeypatch.setattr(path, "compare", lambda *given: Comparison(Gain(1.0, 1e-3, 0.999), NO_GAIN, 0.5, True))
     monkeypatch.setattr(path, "listed", lambda *_: Freely([], [()], lambda *_: True))
     monkeypatch.setattr(path, "weighed", lambda *_: seen(None, RANDOM))
