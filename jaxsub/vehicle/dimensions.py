@@ -43,7 +43,7 @@ def check_units(layout: Layout, recordings: Sequence[Recording]) -> None:
             if column in recording.unusable:
                 recording.column(column)
             if expected and (stated := recording.units.get(column)):
-                _check(recording, column, stated, expected)
+                _check(recording, column, stated, si_unit(expected) or "1")
     if layout.kind == "mechanism":
         _check_alike(list(taken), recordings)
         for recording in recordings:
@@ -51,20 +51,15 @@ def check_units(layout: Layout, recordings: Sequence[Recording]) -> None:
 
 
 def _taken(layout: Layout) -> Iterator[tuple[str, str]]:
-    """The columns that a vehicle takes from a recording, each with its SI unit, empty where it may have any."""
+    """The columns that a vehicle takes from a recording, each with its unit, empty where it may have any."""
     body = layout.kind == "submerged-body"
     for name, column in layout.inputs:
-        yield column, _si(layout.input_unit(name))
+        yield column, layout.input_unit(name)
     for pairs, units in ((layout.prescribed, CHANNEL_UNITS), (layout.environment, _ENVIRONMENT_UNITS)):
         for name, column in pairs:
-            yield column, _si(units[name]) if body else ""
+            yield column, units[name] if body else ""
     for channel in layout.channels:
-        yield channel, _si(CHANNEL_UNITS[channel]) if body else ""
-
-
-def _si(unit: str) -> str:
-    """`unit` as recordings state it; empty where it is not known."""
-    return (si_unit(unit) or "1") if unit else ""
+        yield channel, CHANNEL_UNITS[channel] if body else ""
 
 
 def _check(recording: Recording, column: str, stated: str, expected: str) -> None:

@@ -104,7 +104,7 @@ def _read_inputs(table: Table, body: bool) -> tuple[tuple[tuple[str, str], ...],
     pairs, stated = read_inputs(table)
     known = {name: INPUT_UNITS[name] for name, _ in pairs if body and name in INPUT_UNITS}
     for name, unit in known.items():
-        if not same_dimension(stated.get(name, unit), unit):
+        if name in stated and not same_dimension(stated[name], unit):
             place = f"{table.place(name)}.unit"
             raise InputError(place, f"is {stated[name]!r}, and {name} is in {unit}", f'write unit = "{unit}"')
     return pairs, stated | known

@@ -44,6 +44,14 @@ def run(**columns):
     return from_pandas(pandas.DataFrame({"t": [0.0, 1.0]} | table), "run")
 
 
+def test_files_that_state_no_unit_need_no_table_of_units(monkeypatch):
+    def refused(unit):
+        raise AssertionError(f"{unit} was looked up")
+
+    monkeypatch.setattr("jaxsub.units._units", refused)
+    check_units(body(), [run(**dict.fromkeys(DIMENSIONS, ""))])
+
+
 @pytest.mark.parametrize("column", DIMENSIONS)
 def test_column_is_taken_in_units_of_its_dimension_and_no_other(column):
     for si, units in WRITTEN.items():
