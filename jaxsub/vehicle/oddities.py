@@ -62,6 +62,13 @@ def _twice(body: SubmergedBody, where: str) -> Iterator[Finding]:
             said = "[model] coriolis" if effect.term == "coriolis" else f"the coefficient {effect.term}"
             what = f"says what {said} says, so no recording can tell them apart"
             yield Finding("said-twice", "warning", f"{where}: effects ({effect.label})", what, "delete one")
+    for name, term in derivatives(body.own_values()).items():
+        if term.name in body.actuators.names:
+            devices = [one.name for one in body.actuators.items if set(term.inputs) & set(dict(one.input))]
+            what = f"acts beside [actuators.{'], [actuators.'.join(devices)}], whose force it adds to"
+            yield Finding(
+                "said-twice", "warning", f"{where}: coefficients.{name}", what, "delete it if both are the same"
+            )
 
 
 def _converted(body: SubmergedBody, where: str) -> Iterator[Finding]:

@@ -273,3 +273,10 @@ def test_an_input_whose_actuator_acts_on_locked_motions_is_reported():
     text = TEXT.replace("direction = [0.0, 1.0, 0.0]", "direction = [0.0, 0.0, 1.0]")
     found = [one.where for one in vehicle_findings(rov(text), "rov.toml") if one.check == "idle-input"]
     assert found == ["rov.toml: inputs.tail"]
+
+
+def test_a_coefficient_beside_an_actuator_of_the_same_input_and_equation_is_reported():
+    text = TEXT.replace("B_yaw_trim = 0.4", "B_yaw_trim = 0.4\nB_yaw_port = 0.1\nB_sway_port = 0.2")
+    found = {one.where: one.what for one in vehicle_findings(rov(text), "rov.toml") if one.check == "said-twice"}
+    assert list(found) == ["rov.toml: coefficients.B_yaw_port"]
+    assert "[actuators.port]" in found["rov.toml: coefficients.B_yaw_port"]
