@@ -55,6 +55,24 @@ def test_for_a_user_without_a_home_nothing_is_written_to_the_current_folder(tmp_
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("given", "long", "expected"),
+    [(None, False, "cpu"), ("", False, "cpu"), ("cuda,cpu", False, "cuda,cpu"), (None, True, "None")],
+)
+def test_short_commands_take_an_accelerator_only_where_it_is_named(given, long, expected):
+    """Claim: what is not long runs on the processor, though JAX would pick a GPU; what the user names is kept."""
+    program = f"from jaxsub.cli import session; session.start({long}); import jax; print(jax.config.jax_platforms)"
+    base = {name: value for name, value in os.environ.items() if name != "JAX_PLATFORMS"}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=base | {"PYTHONPATH": str(ROOT)} | ({} if given is None else {"JAX_PLATFORMS": given}),
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.stdout == f"{expected}\n", done.stderr
+
+
 @pytest.mark.parametrize("damage", [lambda entry: entry[: len(entry) // 2], lambda entry: b"", lambda entry: b"x" * 99])
 def test_damaged_programs_are_replaced_with_one_note(tmp_path, damage):
     assert ran(XDG_CACHE_HOME=str(tmp_path)) == ""
