@@ -12,9 +12,9 @@ from ..likelihood import Disturbance
 from ..vehicle import AbstractVehicle
 from .cross_validation import Comparison, Predicted, compare, one_step_ahead, simulated
 from .evidence import evidence_of
-from .generic import Pattern, most_explained
 from .model import are_significant, fit_with, is_admissible, p_value, refit
 from .name import Named, Naming, named_on, refitted, standing
+from .nonparametric import Pattern, most_explained
 from .programs import make_room
 from .progress import Progress
 from .rivals import told_apart

@@ -15,13 +15,12 @@ from ..results import RESULTS
 from ..vehicle import AbstractVehicle, vehicle_findings
 from .acceptance import Examination, Model, ModelFitter, fitted_model
 from .advice import next_manoeuvre
-from .ahead import in_pieces
 from .batch import batch
 from .consistency import consistent
 from .diagnosis import Candidate, Diagnosis, Location, Physics, Rival
 from .evaluation import overlays
 from .examine import examine
-from .explain import explained
+from .innovation_models import segmented
 from .kinds import leading, missing, right
 from .locate import Field, effect_shares, locations, shares, traces
 from .model import with_coloured_errors
@@ -31,8 +30,9 @@ from .progress import Progress, limited
 from .settings import LISTED, REPORTED_DISTURBANCE, RIVALS_FITTED
 from .show import channel_quality, coefficients, estimates, run_quality, trades
 from .shown import shown_on
-from .stand_in import described
+from .structure_search import search_structure
 from .summary import summary
+from .surrogate import with_surrogate
 from .validation import beyond_noise
 from .verdict import Judged
 from .view import View, look
@@ -80,10 +80,10 @@ def diagnose(
     fitter, baseline = ModelFitter(until, vehicle), fitted_model(start, found.view, ())
     account = _Account(vehicle, train, found, field, baseline)
     so_far = lambda model, judged: keep(*account.of(model, model, judged, ()))
-    named, judged, left = explained(fitter, baseline, found, vocabulary, so_far, begin)
-    best, judged = (named, judged) if left is None else described(fitter, named, left, judged, vocabulary)
+    named, judged, left = search_structure(fitter, baseline, found, vocabulary, so_far, begin)
+    best, judged = (named, judged) if left is None else with_surrogate(fitter, named, left, judged, vocabulary)
     if best.pieces > 1:
-        account = dataclasses.replace(account, baseline=in_pieces(baseline, best.pieces))
+        account = dataclasses.replace(account, baseline=segmented(baseline, best.pieces))
     progress("simulating the test runs")
     return account.of(named, best, judged, test)
 

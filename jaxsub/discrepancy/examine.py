@@ -1,4 +1,4 @@
-"""What the vocabulary, and a force without a name, say about the recordings of one view."""
+"""One examination: the evidence of all candidates, and of a nonparametric force, along one filtered trajectory."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from ..likelihood import whitened
 from .acceptance import Examination
 from .columns import candidate_columns
 from .evidence import Evidence
-from .generic import pattern
 from .name import Naming, name
+from .nonparametric import pattern
 from .programs import make_room
 from .progress import Progress
 from .selector import Selector
@@ -18,12 +18,12 @@ from .whiteness import RANDOM, Memory, memory
 
 
 def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Examination:
-    """Name what the recordings of a view ask for, and see whether a force without a name would say it better."""
+    """The effects selected along the filtered trajectory of a view, and the best nonparametric force beside them."""
     return weighed(view, listed(view, vocabulary), progress)
 
 
 def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, *, present: bool = False) -> Selector:
-    """All that the recordings of a view may ask for and that its vehicle does not have; or also what is `present`."""
+    """All candidates that the vehicle of a view does not have; or also those that are `present` in it."""
     make_room()
     there = set() if present else {effect.label for effect in view.vehicle.effects}
     known = tuned(view, facts(view))
@@ -33,11 +33,11 @@ def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, *, p
 
 
 def weighed(view: View, selector: Selector, progress: Progress) -> Examination:
-    """What the candidates of a selector that are usable say, and a force without a name beside them."""
+    """The examination by the usable candidates of a selector."""
     naming, evidence = name(selector, progress), selector.evidence
     if naming.again:
         return Examination(view, selector, naming, None, RANDOM)
-    progress("looking for forces without a name")
+    progress("looking for nonparametric forces")
     bare = evidence.best([])[1]
     under = [naming.products] if naming.products is bare else [bare, naming.products]
     return Examination(
@@ -46,7 +46,7 @@ def weighed(view: View, selector: Selector, progress: Progress) -> Examination:
 
 
 def _memory(evidence: Evidence, naming: Naming) -> Memory:
-    """Whether what the named leave is random."""
+    """The test of whether the innovations that the selected effects leave are white."""
     products, system = naming.products, evidence.view.followed.system
     white, _ = whitened(products.disturbance, system, evidence.left(naming.columns, products))
     gain = 2.0 * (naming.value - evidence.best([])[0])

@@ -24,8 +24,8 @@ import numpy as np
 
 from ..effects import KNOTS
 from .evidence import Products
-from .hats import shapes
 from .settings import LENGTH_SCALES
+from .spline_basis import hat_functions
 
 # three knots between any two of `SmoothForce`
 FINE = 4 * (KNOTS - 1) + 1
@@ -74,4 +74,4 @@ def _roots() -> list[np.ndarray]:
 
 def coarse() -> np.ndarray:
     """(FINE, KNOTS) the hats of `SmoothForce` in terms of the fine ones."""
-    return shapes(np.linspace(0.0, 1.0, FINE), KNOTS)
+    return hat_functions(np.linspace(0.0, 1.0, FINE), KNOTS)

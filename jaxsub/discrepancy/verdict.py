@@ -8,8 +8,8 @@ from ..effects import AbstractEffect
 from .cross_validation import Comparison, Gain
 from .decisions import Decision
 from .diagnosis import Verdict
-from .generic import Pattern
 from .name import Named, Naming
+from .nonparametric import Pattern
 from .settings import CERTAIN, CLEAR_LOG_BAYES, EXPLAINED, RESIDUAL_LEVEL, SIGNIFICANCE, UNEXPLAINED_LEVEL
 from .whiteness import Memory
 

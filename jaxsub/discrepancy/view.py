@@ -1,4 +1,4 @@
-"""A fitted model as a filter of it follows its recordings: what every question about left-out physics is asked of."""
+"""A fitted model linearised about its filtered trajectory: what all evidence is computed from."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -29,15 +29,15 @@ from .settings import BLOCKS, LARGE_ERROR
 from .tones import tones
 from .whiteness import record_sigma
 
-# of the channels that may alone be wrong, those that are tried
+# channels tried as the only faulty one
 _DOUBTED = 3
-# of the forces that would explain all that is left: too small to lead a path, and large enough to grow from
+# of the disturbance that would explain all of the misfit: a start that the search can grow from
 _QUIET = 1e-2
 _LEAST_WHITE = 1e-5
 
 
 class Trajectory(eqx.Module):
-    """The motion that took place, as NumPy arrays: what effects are evaluated on.
+    """The filtered trajectory as NumPy arrays: what effects are evaluated on.
 
     NumPy on purpose: a force is a handful of array operations, so a vocabulary of any size costs no compilation.
 
@@ -76,14 +76,14 @@ def _trajectory(vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered:
 
 @dataclasses.dataclass(frozen=True)
 class View:
-    """A model as its recordings lead it.
+    """A model linearised about its filtered trajectory.
 
     **Fields**
 
-    - `vehicle`: with the free numbers that innovations of least squares have. `covariance`: (p, p) theirs, physical.
+    - `vehicle`: with the free parameters estimated by innovations. `covariance`: (p, p) theirs, physical.
     - `runs`, `sigma`: the recordings and their noise, SI.
-    - `followed`: the runs as the model's filter followed them. `disturbance`: under which it did.
-    - `path`: its motion. `base`: the residual's column and those of the free parameters, each of unit length under
+    - `followed`: the filter's pass over the runs. `disturbance`: the one that it assumed.
+    - `path`: its trajectory. `base`: the residual's column and those of the free parameters, each of unit length under
       `disturbance`; `prior`: (p + 1, p + 1) of them. `length`: (p,) what each was divided by.
     """
 
@@ -100,7 +100,7 @@ class View:
 
     @property
     def finite(self) -> bool:
-        """Whether the model could be led along all of the recordings, or diverged on the way."""
+        """Whether the filter passed over all of the recordings without divergence."""
         return bool(np.all(np.isfinite(self.covariance)))
 
     def products(
@@ -128,23 +128,20 @@ class View:
 
 
 def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle | None = None) -> View:
-    """The view of a fit, its free numbers moved to where innovations are least.
+    """The view of a fit, its free parameters and disturbance re-estimated by innovations.
 
-    The search for the disturbance starts from what the residuals ask, or from the given one where that is better: after
-    a fit that explains more, it is far too large, and numbers that are moved under it are lost.
+    The disturbance starts from a guess by the residuals, or from the given one where that is better: after a fit that
+    explains more, the guess is far too large.
 
-    Where a fit leaves much, several searches are begun and the better half goes on after each turn. Numbers are moved
-    from those of the fit and from those of the `file`: a fit that has to do without the physics may end where nothing
-    leads back. Nor are its initial states to be trusted, and a filter begins at what is known before the fit. And what
-    is left is put down to forces at first, or to sensors: forces that follow a sensor which is wrong make the right
-    ones wrong.
+    Where a fit leaves errors far above the noise, the search is a multi-start one, whose better half goes on after each
+    alternation. Parameters start from the fit and from the `file`: a fit without the missing physics may be in an
+    optimum that nothing leads out of. Its initial states are not trusted either, and the filter begins at their prior.
+    The misfit is first attributed to forces, or to sensors: forces that follow a faulty sensor bias all others.
 
-    Numbers of the file are taken to be of the right order. Where recordings hardly tell them, such as without a
-    velocity log, numbers a hundred times too large can do what an actuator's force does, and nothing would be left to
-    name it by.
+    Parameters of the file have a wide prior. Without a velocity log, say, the recordings hardly identify some, and
+    values a hundred times too large could absorb an actuator's force.
     """
     problem, rms = with_wide_priors(fit.problem), fit.rms
-    # such a fit is not trusted to have ended near the truth
     much = max(rms.values()) > LARGE_ERROR
     search = InnovationSearch(problem, problem.guess if much else fit.start)
     guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.spread), noise=_white(fit))
@@ -163,10 +160,10 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
 
 
 def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: Iterable[Disturbance]) -> View:
-    """The view of a vehicle, its free numbers moved from where they are to where innovations are least.
+    """The view of a vehicle, its free parameters estimated by innovations from where they are.
 
-    One search, from the best of some disturbances: of numbers that came of innovations already, but for a few. It goes
-    on until it arrives: of what is far off, a linear picture promises much that is not so.
+    One search, from the best of some disturbances: most parameters come from innovations already. It goes on until it
+    converges, since the first steps are far from linear.
     """
     problem = with_wide_priors(Problem.of(vehicle, runs, sigma))
     search = InnovationSearch(problem, problem.guess)
@@ -194,8 +191,9 @@ def _view(search: InnovationSearch, iterate: Iterate) -> View:
 
 
 def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturbance, list[Disturbance]]:
-    """What a fit leaves, `rms` over sigma of each channel, put down to the noise of all channels; or of one that it
-    leaves much in, and in the others to forces: for each such.
+    """Disturbances by which a misfit, `rms` over sigma of each channel, is noise of all channels, or of one.
+
+    Of one for each channel with a large misfit; that of the others is then attributed to forces.
     """
     noisy = np.maximum(guess.noise, rms)
     alone = [np.where(own, noisy, guess.noise) for own in np.diag(rms > LARGE_ERROR) if own.any()]
@@ -205,14 +203,14 @@ def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturb
 
 @eqx.filter_jit
 def _guessed(model: Linearised, runs: Runs, sigma: Array, spread: Array) -> Disturbance:
-    """Where to look for the forces in what a fit leaves."""
+    """The first guess of the disturbance, by the residuals of a fit."""
     return first_guess(System.of(model, runs, sigma, spread), model.error / sigma)
 
 
 def _white(fit: Fit) -> np.ndarray:
-    """Where to look for the noise of each channel, in units of the fit's: what is white in its errors.
+    """The first guess of each channel's noise, in units of the fit's: the white part of its errors.
 
-    A noise that the file leaves open is the whole misfit of a free run until now, which may be a thousand times larger.
+    A sigma that the file leaves open has so far absorbed the whole simulation error, which may be a thousand times it.
     """
     white = record_sigma(np.asarray(fit.model.error), np.asarray(fit.runs.mask)) / np.asarray(fit.sigma)
     given = np.array([output.sigma is not None for output in fit.vehicle.layout.outputs])
@@ -220,13 +218,13 @@ def _white(fit: Fit) -> np.ndarray:
 
 
 def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndarray, "r k n"]]:
-    """The force (N, N m) that the recordings ask for beyond the model given all samples, and its standard deviation."""
+    """The smoothed disturbance force (N, N m), which the model lacks, and its standard deviation."""
     mean, spread = smoothed(view.disturbance, view.followed.system, _left(view))
     return np.asarray(mean), np.asarray(spread)
 
 
 def _left(view: View) -> Columns:
-    """The residual, less what the free parameters take up of it."""
+    """The innovations less their projection on the free parameters."""
     gram = np.sum(view.products(view.base, view.disturbance)[0], axis=0) + view.prior
     weights = np.array([1.0, *-np.linalg.solve(gram[1:, 1:], gram[1:, 0])])
     return jax.tree.map(lambda column: (column @ weights)[..., None], view.base)

@@ -10,9 +10,9 @@ import pytest
 from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter, proposed_effects
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
 from jaxsub.discrepancy.evidence import Products
-from jaxsub.discrepancy.explain import without_idle
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.selector import Scan, Selector
+from jaxsub.discrepancy.structure_search import without_redundant
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.likelihood import Disturbance
@@ -111,12 +111,12 @@ def test_what_stood_in_for_a_later_effect_is_left_out(monkeypatch, kept):
     fitter, asked = object.__new__(ModelFitter), []
     fitted = lambda base, effects, disturbance: asked.append(effects) or fewer
     object.__setattr__(fitter, "with_effects", fitted)
-    path = sys.modules["jaxsub.discrepancy.explain"]
+    path = sys.modules["jaxsub.discrepancy.structure_search"]
     said = Comparison(Gain(1.0, 1.0 - kept, float(kept)), Gain(0.0, 1.0, 1.0), 1.0, True)
     monkeypatch.setattr(path, "compare", lambda before, after: said)
     monkeypatch.setattr(Model, "significant", True)
     judged = Judged("named", [Named(0, old, 1.0, [], []), Named(1, new, 1.0, [], [])], 1e-9, [])
-    model, after = without_idle(fitter, Model(None, None, None, ()), best, judged, [old])
+    model, after = without_redundant(fitter, Model(None, None, None, ()), best, judged, [old])
     assert asked == [[new]]
     assert model is (best if kept else fewer)
     assert [one.effect for one in after.named] == ([old, new] if kept else [new])

@@ -24,10 +24,10 @@ from jaxsub.discrepancy.acceptance import (
     dominant,
 )
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
-from jaxsub.discrepancy.explain import after_all
 from jaxsub.discrepancy.model import are_significant, fit_with
 from jaxsub.discrepancy.name import Named, refitted
 from jaxsub.discrepancy.selector import Selector
+from jaxsub.discrepancy.structure_search import reconsidered
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM, Memory
@@ -229,7 +229,7 @@ class Asked:
     def __init__(self, monkeypatch, *answers, ahead=None, result=RESULTS.successful):
         self.answers, self.tried, self.selector, self.ahead = [*answers], 0, object.__new__(Selector), []
         self.result = result
-        path = sys.modules["jaxsub.discrepancy.explain"]
+        path = sys.modules["jaxsub.discrepancy.structure_search"]
 
         def next_asked(fitter, base, vocabulary):
             self.ahead.append(self.tried)
@@ -240,7 +240,7 @@ class Asked:
             "proposed_effects": lambda found, judged: [0] if self.answers else [],
             "accept_proposed": self.try_one,
             "weighed": lambda *_: self.found(),
-            "by_what_comes_next": next_asked,
+            "stepwise_by_innovations": next_asked,
         }
         for name, fake in fakes.items():
             monkeypatch.setattr(path, name, fake)
@@ -322,7 +322,7 @@ def fitted_to(monkeypatch, model, said, after, asked):
         asked.append(chosen)
         return model, said
 
-    path = sys.modules["jaxsub.discrepancy.explain"]
+    path = sys.modules["jaxsub.discrepancy.structure_search"]
     monkeypatch.setattr(path, "accept_proposed", stand)
     monkeypatch.setattr(path, "examine", lambda *_: after)
     return path
@@ -342,11 +342,11 @@ def test_a_name_stands_after_all_where_its_fit_leaves_no_force_in_its_place(monk
     path = fitted_to(monkeypatch, better, named, after, asked)
     monkeypatch.setattr(path, "evidence_of", lambda view: 0.0)
     fitter = silent()
-    found = after_all(fitter, base, seen("roll", yaw, roll), unknown, None)
+    found = reconsidered(fitter, base, seen("roll", yaw, roll), unknown, None)
     assert asked == [[7]]
     assert found == ((better, named, after) if stands else (base, unknown, None))
-    assert after_all(fitter, base, seen("surge", yaw, roll), unknown, None) == (base, unknown, None)
-    assert after_all(fitter, base, seen(None, yaw, roll), unknown, None) == (base, unknown, None)
+    assert reconsidered(fitter, base, seen("surge", yaw, roll), unknown, None) == (base, unknown, None)
+    assert reconsidered(fitter, base, seen(None, yaw, roll), unknown, None) == (base, unknown, None)
     assert asked == [[7]]
 
 
@@ -370,7 +370,7 @@ def test_names_that_say_most_by_a_linear_picture_are_asked_by_their_fit(monkeypa
     evidence = iter([500.0, 0.0])
     monkeypatch.setattr(path, "evidence_of", lambda view: next(evidence))
     first = looked(SimpleNamespace(named=[delay, scale]), None, Memory(1e-9, share, 900.0))
-    model, said, found = after_all(silent(), base, first, unknown, None)
+    model, said, found = reconsidered(silent(), base, first, unknown, None)
     assert asked == ([] if stands is None else [[3, 7]])
     assert (model, found) == ((better, after) if stands else (base, None))
     assert said.named == ([delay] if stands else [])

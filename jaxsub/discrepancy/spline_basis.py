@@ -1,7 +1,7 @@
-"""Forces that follow one variable of a motion, by hats, and which of them a force may be.
+"""Nonparametric forces of one variable, in linear splines, and which variables predict the missing force.
 
-A force that recordings ask for passes for random in a filter. The variable that it follows tells it in parts of the
-recordings from the others.
+A missing force appears as a disturbance in a filter. The variable that it is a function of predicts it, in one part of
+the recordings by the others.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from ..effects import KNOTS, SmoothForce, variables
 from .settings import BLOCKS, FORCE_RIDGE, FORCES_PER_EQUATION
 from .view import View
 
-# places of the body, with which no force that is worth a description grows
+# positions, of which no force is a function
 _LEFT_OUT = ("x", "y")
 _STILL = 1e-9
 # knots of the regression that picks a force
@@ -34,22 +34,22 @@ def smooth_forces(view: View) -> list[SmoothForce]:
     return found
 
 
-def promising(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) -> list[SmoothForce]:
-    """Of each equation's forces those that tell most of the `missing` force (R, K, n) in parts they were not told."""
+def promising_forces(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) -> list[SmoothForce]:
+    """Of each equation's forces those that predict most of the `missing` force (R, K, n) in cross-validation."""
     equations = view.vehicle.layout.equations
-    told = {}
+    predicted = {}
     for force in {force.variable: force for force in forces}.values():
-        told[force.variable] = dict(zip(equations, _told(view, force, missing), strict=True))
+        predicted[force.variable] = dict(zip(equations, _predicted_share(view, force, missing), strict=True))
     chosen: list[SmoothForce] = []
     for equation in equations:
         own = [force for force in forces if force.equation == equation]
-        chosen += sorted(own, key=lambda force: -told[force.variable][force.equation])[:FORCES_PER_EQUATION]
+        chosen += sorted(own, key=lambda force: -predicted[force.variable][force.equation])[:FORCES_PER_EQUATION]
     return chosen
 
 
-def _told(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
-    """(n,) share of each equation's missing force that the force's variable tells in pieces by the other pieces."""
-    drawn, live = shapes(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
+def _predicted_share(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
+    """(n,) share of each equation's missing force that the variable predicts in blocks by the other blocks."""
+    drawn, live = hat_functions(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
     pieces = [(r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), BLOCKS)]
     H, y = [drawn[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
     G = np.array([h.T @ h for h in H])
@@ -60,21 +60,21 @@ def _told(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
     return 1.0 - left.sum(axis=0) / np.maximum(squares.sum(axis=0), 1e-300)
 
 
-def hats(view: View, force: SmoothForce, knots: int) -> list[np.ndarray]:
-    """The force of each of its hats at both ends of each interval, (2, R, K-1, n)."""
+def basis_forces(view: View, force: SmoothForce, knots: int) -> list[np.ndarray]:
+    """The force of each hat function at both ends of each interval, (2, R, K-1, n)."""
     equations = view.vehicle.layout.equations
     own = np.eye(len(equations))[equations.index(force.equation)]
-    drawn = shapes(_place(view, force), knots)
+    drawn = hat_functions(_place(view, force), knots)
     return [drawn[..., j, None] * own for j in range(knots)]
 
 
-def shapes(place: np.ndarray, knots: int) -> np.ndarray:
-    """(..., knots) hats at equidistant knots, `place` being 0 at the first and 1 at the last."""
+def hat_functions(place: np.ndarray, knots: int) -> np.ndarray:
+    """(..., knots) hat functions at equidistant knots, `place` being 0 at the first and 1 at the last."""
     return np.maximum(0.0, 1.0 - np.abs(place[..., None] * (knots - 1) - np.arange(knots)))
 
 
 def _place(view: View, force: SmoothForce) -> np.ndarray:
-    """(2, R, K-1) where in its range the variable is at both ends of each interval, from 0 to 1."""
+    """(2, R, K-1) the variable at both ends of each interval, from 0 to 1 of its range."""
     shape = view.path.steps.shape
     ends = [np.broadcast_to(np.asarray(variables(m)[force.variable]), shape) for m in (view.path.start, view.path.end)]
     return np.clip((np.stack(ends) - force.low) / (force.high - force.low), 0.0, 1.0)

@@ -1,7 +1,7 @@
-"""Is a force left that the motion predicts, whatever its name? A smooth one of each variable in each equation.
+"""The nonparametric force that explains most: a smooth function of one variable in one equation.
 
-All are sought in the force that the recordings ask for and that passes for random; the few of each equation whose
-variable tells most of it elsewhere are then weighed by what they add to the evidence.
+All variables and equations are screened by how well they predict the estimated disturbance in cross-validation. The
+evidence of the best few of each equation is then computed.
 """
 
 import dataclasses
@@ -15,27 +15,27 @@ from ..effects import KNOTS, SmoothForce, with_numbers
 from ..likelihood import Disturbance, smoothed
 from .columns import force_columns
 from .evidence import Evidence, Products
-from .hats import hats, promising, smooth_forces
 from .settings import FORCE_DISTURBANCE_SHARES, LENGTH_SCALES, MAJORITY, SIGNIFICANCE
 from .smoothness import FINE, Smooth, coarse, smoothest
+from .spline_basis import basis_forces, promising_forces, smooth_forces
 from .view import View
 
-# of all that the knots tell, which each tells at least
+# least information of a knot, of that of all knots
 _ROUNDING = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
 class Pattern:
-    """The force that best follows one variable, on top of what was chosen.
+    """The nonparametric force of largest evidence on top of the selected effects.
 
     **Fields**
 
-    - `force`: with its predicted numbers; `heights`: (FINE,) its own, N or N m, at finer knots. `near`: the share of
-      what these tell that the force keeps.
-    - `p_value`: that so much is luck, corrected for all tried; `predicts`: whether it helps to predict parts of the
-      recordings from the others.
-    - `alone`: log evidence with it and nothing else, and how probable it is before the data.
-    - `explained`: the share of what chosen effects and it explain together that the chosen ones explain alone.
+    - `force`: with its predicted parameters; `heights`: (FINE,) of it, N or N m, at finer knots. `near`: the share of
+      their squares, along the motion, that the force keeps.
+    - `p_value`: corrected for all forces screened; `predicts`: whether it improves the prediction of parts of the
+      recordings by the others.
+    - `alone`: log evidence with it and nothing else, its prior probability included.
+    - `explained`: the share of what the selected effects and it explain together that the effects explain alone.
     """
 
     force: SmoothForce
@@ -48,17 +48,17 @@ class Pattern:
 
     @property
     def significant(self) -> bool:
-        """Whether it is there."""
+        """Whether it is significant and predicts."""
         return self.predicts and self.p_value < SIGNIFICANCE
 
     @property
     def joins(self) -> bool:
-        """Whether the force is near enough to what is there to stand in a model."""
+        """Whether moreover its few knots are near enough to the fine ones for a model."""
         return self.significant and self.near > MAJORITY
 
     @property
     def described(self) -> str:
-        """The shortest sum of at most two plain terms that is near it: a description and no name."""
+        """The sum of at most two elementary terms that is nearest to it, by an information criterion."""
         x, y, name = np.linspace(self.force.low, self.force.high, FINE), self.heights, self.force.variable
         terms = {"1": np.ones(FINE), name: x, f"{name}²": x**2, f"{name} |{name}|": x * np.abs(x), f"{name}³": x**3}
         turns = [_wave(2.0 * np.pi * periods / (x[-1] - x[0]), x, y) for periods in np.arange(1.0, FINE / 4, 0.25)]
@@ -87,31 +87,31 @@ def _fitted(columns: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Products]) -> Pattern | None:
-    """The force that recordings ask for most beyond the `columns` of what was `chosen`; None where nothing moves.
+    """The force of largest evidence beyond the `columns` of the `chosen` effects; None where nothing moves.
 
-    Under shares of the disturbances of the products `under`, of which the last is that with what was chosen.
+    Under shares of the disturbances of the products `under`, of which the last is that with the chosen effects.
     """
     forces = smooth_forces(view)
     if not forces:
         return None
     left = chosen.left(columns, under[-1])
     mean, _ = smoothed(under[-1].disturbance, view.followed.system, left)
-    weighed = promising(view, forces, np.asarray(mean))
+    weighed = promising_forces(view, forces, np.asarray(mean))
     asked = [
         p.disturbance if share == 1.0 else dataclasses.replace(p.disturbance, force=share * p.disturbance.force)
         for p in under
         for share in FORCE_DISTURBANCE_SHARES
     ]
-    # one force after the other: nobody asks for products of one's hats with another's
+    # one force after the other: products between forces are not needed
     picked = chosen.picked(columns)
-    of = lambda force: Evidence.of(view, picked + force_columns(view, hats(view, force, FINE)), asked)
+    of = lambda force: Evidence.of(view, picked + force_columns(view, basis_forces(view, force, FINE)), asked)
     every = [_Weighed(found.products, found.length[len(columns) :], len(columns)) for found in map(of, weighed)]
     values = [each.values(each.held) for each in every]
     best = int(np.argmax([np.max(each) for each in values]))
     found, at = every[best], int(np.argmax(values[best]))
     gain = float(np.max(values[best])) - found.before
     p_value = min(1.0, 0.5 * len(forces) * len(LENGTH_SCALES) * float(special.chdtrc(1, 2.0 * max(0.0, gain))))
-    # how large it is is a number of the force, as probable before the data as others; so is which force it is
+    # the prior standard deviation counts as one parameter, and every force is equally probable a priori
     alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
     heights, size, explained = found.heights(at)
     force = dataclasses.replace(weighed[best], spread=float(f"{size:.6g}"))
@@ -121,9 +121,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
 
 @dataclasses.dataclass(frozen=True)
 class _Weighed:
-    """Products of the chosen columns, which are the first `count`, and of one force's hats, whose `length` (FINE,) is
-    that of their columns.
-    """
+    """Products of the chosen columns, the first `count`, and of one force's hat functions of `length` (FINE,)."""
 
     products: Sequence[Products]
     length: np.ndarray
@@ -136,7 +134,7 @@ class _Weighed:
 
     @property
     def own(self) -> list[int]:
-        """The hats."""
+        """The columns of the hat functions."""
         return list(range(self.count, self.count + FINE))
 
     @property
@@ -146,7 +144,7 @@ class _Weighed:
 
     @property
     def before(self) -> float:
-        """Log evidence of what was chosen."""
+        """Log evidence of the chosen columns."""
         return max(products.log_evidence(self.held) for products in self.products)
 
     def values(self, held: list[int]) -> np.ndarray:
@@ -155,17 +153,17 @@ class _Weighed:
         return np.array([p.log_evidence(held) + gain(p) for p in self.products])
 
     def together(self, products: Products) -> tuple[Products, Smooth]:
-        """Products of what was chosen and of the columns of the force's prior, and the smooth function of these."""
+        """Products of the chosen columns and of those of the force's prior, and the smooth function."""
         smooth = smoothest(products, self.held, self.own, self.length)
         return products.mixed(self.held, self.own, smooth.weights), smooth
 
     def predicts(self) -> bool:
-        """Whether parts of the recordings are better predicted with the force, each under what suits it."""
+        """Whether the force improves the prediction of parts of the recordings, under the best disturbance of each."""
         with_it = max(float(np.sum(self.together(p)[0].predicted([*self.held, *self.own]))) for p in self.products)
         return with_it > max(float(np.sum(p.predicted(self.held))) for p in self.products)
 
     def heights(self, at: int) -> tuple[np.ndarray, float, float]:
-        """Of the force, how far from zero they are before the data, and of what all explain the chosen's share."""
+        """The force at the knots, its prior standard deviation, and the share explained by the chosen columns."""
         both, smooth = self.together(self.products[at])
         gains = both.gains(self.held, [self.own])
         fall = both.fall(self.held)
@@ -174,11 +172,11 @@ class _Weighed:
         return heights, smooth.size, float(np.clip(explained, 0.0, 1.0))
 
     def nearest(self, at: int, force: SmoothForce, heights: np.ndarray) -> tuple[SmoothForce, float]:
-        """The force with the numbers that are nearest to `heights` along the motion, and how near they are."""
+        """The force with the parameters nearest to `heights` along the motion, and the share of squares it keeps."""
         G, _ = self.products[at].remaining(self.held, self.own)
         G = G * np.outer(self.length, self.length)
         C, told = coarse(), float(heights @ G @ heights)
-        # knots where nothing moved follow their neighbours' heights
+        # knots without data are interpolated
         G = G + _ROUNDING * float(np.trace(G)) * np.eye(FINE)
         few = np.linalg.solve(C.T @ G @ C, C.T @ G @ heights)
         lost = float((heights - C @ few) @ G @ (heights - C @ few))
@@ -191,7 +189,7 @@ def most_explained(view: View, disturbance: Disturbance) -> float:
     forces = smooth_forces(view)
     if not forces:
         return 0.0
-    drawn = force_columns(view, [column for force in forces for column in hats(view, force, KNOTS)])
+    drawn = force_columns(view, [column for force in forces for column in basis_forces(view, force, KNOTS)])
     products = Evidence.of(view, drawn, [disturbance]).products[0]
     return float(np.max(products.explained([], _owners(forces, 0, KNOTS))))
 

@@ -1,4 +1,4 @@
-"""What the recordings ask for, tried and asked again until what is left is random, refused or without a name."""
+"""The structure search: effects are proposed, fitted and accepted until none is left that is."""
 
 import dataclasses
 from collections.abc import Callable, Generator, Sequence
@@ -10,18 +10,18 @@ from .acceptance import Examination, Model, ModelFitter, accept_proposed, propos
 from .cross_validation import compare
 from .evidence import evidence_of
 from .examine import examine, weighed
-from .many import by_what_comes_next
 from .name import standing
 from .progress import OutOfTime
 from .settings import EXPLAINED, MAJORITY, MOST_EFFECTS, MOST_REJECTIONS
+from .stepwise import stepwise_by_innovations
 from .verdict import NOTHING, Judged, both, by_fit, helped, idle, incomplete, judge, settled
 from .whiteness import share_of
 
-# a model, what is to be said with it, and the last look at what it leaves, if anything may be left
+# a model, the judgement with it, and the examination of what it leaves, if anything may be left
 Answer = tuple[Model, Judged, Examination | None]
 
 
-def explained(
+def search_structure(
     fitter: ModelFitter,
     baseline: Model,
     found: Examination,
@@ -29,7 +29,7 @@ def explained(
     keep: Callable[[Model, Judged], object] = lambda model, judged: None,
     begin: Sequence[AbstractEffect] = (),
 ) -> Answer:
-    """The model with what can be named, as `answers` ends; the answer so far where it is ended before.
+    """The model with all accepted effects, as `answers` ends; the answer so far where time runs out.
 
     Each answer before the last is given to `keep`.
     """
@@ -53,42 +53,42 @@ def answers(
     vocabulary: tuple[type[AbstractEffect], ...] | None,
     begin: Sequence[AbstractEffect] = (),
 ) -> Generator[tuple[Model, Judged], None, Answer]:
-    """The answer so far after each round of proposals that accepts something; returns the one to be given.
+    """The answer so far after each round that accepts an effect; returns the last one.
 
     With effects to `begin` with, which an earlier answer had, the first round is theirs.
 
-    Everything is looked at again from a model with what stands, where a free run asked for it, others fell, or what
-    they leave is not random: far from the truth a linear picture shows the largest alone. Where the baseline does not
-    run free, and where all that was named is rejected, what comes next is asked, once; and where the
-    mismatch is then beyond doubt still, the rest of the vocabulary.
+    After each acceptance all candidates are examined again from the new model: far from the truth, the linearisation
+    shows only the largest effect. Where the baseline cannot be simulated, and where all proposals are rejected,
+    stepwise selection by innovations is tried, once. Where the mismatch is significant still, the remaining candidates
+    are proposed.
     """
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
-    # a free run that cannot be fitted asks for nothing
+    # a simulation that cannot be fitted proposes nothing
     told_ahead = bool(baseline.fit.result != RESULTS.successful)
-    ahead = by_what_comes_next(fitter, baseline, vocabulary) if told_ahead else None
+    ahead = stepwise_by_innovations(fitter, baseline, vocabulary) if told_ahead else None
     if ahead is not None:
         return *ahead, None
     if begin:
-        best, judged = begun(fitter, baseline, found, begin)
+        best, judged = warm_started(fitter, baseline, found, begin)
         if judged.named:
             yield best, judged
             found = examine(best.view, vocabulary, fitter.progress)
     while True:
         said, after = judge(found.naming, found.pattern, found.memory), None
         chosen = proposed_effects(found, said)
-        # what was left out once and is asked for again stays: it would come and go
+        # an effect dropped once and proposed again stays, or the search would cycle
         older = [effect for effect in best.added if effect.label not in dropped]
         if chosen:
             best, said = accept_proposed(fitter, best, found, chosen, said)
         else:
-            best, said, after = after_all(fitter, best, found, said, vocabulary)
+            best, said, after = reconsidered(fitter, best, found, said, vocabulary)
         judged = both(judged, said)
         if chosen and said.named:
-            best, judged = without_idle(fitter, baseline, best, judged, older)
+            best, judged = without_redundant(fitter, baseline, best, judged, older)
             dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
         if chosen and not said.named:
-            ahead = None if told_ahead else by_what_comes_next(fitter, best, vocabulary)
+            ahead = None if told_ahead else stepwise_by_innovations(fitter, best, vocabulary)
             if ahead is not None:
                 return ahead[0], both(judged, ahead[1]), None
             told_ahead = True
@@ -104,19 +104,20 @@ def answers(
         found = after or examine(best.view, vocabulary, fitter.progress)
 
 
-def begun(
+def warm_started(
     fitter: ModelFitter, baseline: Model, found: Examination, effects: Sequence[AbstractEffect]
 ) -> tuple[Model, Judged]:
-    """The model with the `effects` of an earlier answer, if they are accepted together, and what is to be said.
+    """The model with the `effects` of an earlier answer, if they are accepted together, and the judgement.
 
-    Probabilities are those of the first look. **Raises** `InputError` for an effect that is not among its candidates.
+    Posterior probabilities are those of the first examination. **Raises** `InputError` for an effect that is not among
+    its candidates.
     """
     selector, labels = found.selector, [effect.label for effect in effects]
     numbers = []
     for label in labels:
         own = [i for i, candidate in enumerate(selector.candidates) if candidate.label == label]
         if not own:
-            what = f"{label} is not among the effects that these recordings may ask for"
+            what = f"{label} is no candidate for these recordings"
             raise InputError(fitter.file.layout.name, what, "begin without it")
         numbers.append(max(own, key=lambda i: found.naming.first.value[i]))
     model = fitter.with_effects(baseline, effects, found.naming.products.disturbance)
@@ -126,12 +127,12 @@ def begun(
     return (model if gain.accepted else baseline), settled(helped(judged, ", ".join(labels), gain), named)
 
 
-def without_idle(
+def without_redundant(
     fitter: ModelFitter, baseline: Model, best: Model, judged: Judged, older: Sequence[AbstractEffect]
 ) -> tuple[Model, Judged]:
-    """The model less those `older` effects that are not accepted any more, and what is then to be said.
+    """The model less those `older` effects that are no longer accepted beside the newer ones, and the judgement.
 
-    What was added first may have stood in for what came after it.
+    An effect added first may have been a surrogate of one added later.
     """
     for effect in older:
         others = [e.label for e in best.added if e.label != effect.label]
@@ -144,19 +145,20 @@ def without_idle(
     return best, judged
 
 
-def after_all(
+def reconsidered(
     fitter: ModelFitter,
     base: Model,
     found: Examination,
     judged: Judged,
     vocabulary: tuple[type[AbstractEffect], ...] | None,
 ) -> tuple[Model, Judged, Examination | None]:
-    """The model with names that seemed to say too little, what is to be said, and what is found from there.
+    """The model with effects that the linearisation rejected, where their fit says otherwise.
 
-    A name that a force without one seemed to beat, if it is of the same equation and its fit leaves no such force:
-    where a motion is no larger than its noise, a linear picture along it gives the wrong shape to a force of a rate,
-    which nothing then seems to have. Names that seemed to explain most and too little for the cause, if their fit does
-    not: of what is large a linear picture leaves much, which is no disturbance. Else all is as it was.
+    With the judgement and the examination from there; unchanged, without examination, where the fit agrees. That is an
+    effect which a nonparametric force in the same equation seemed to beat, if its fit leaves no such force: where a
+    motion is no larger than its noise, the filtered trajectory distorts the shape of a force. Or effects that seemed to
+    explain most but too little for the cause, if their fit explains enough: a large effect has a large linearisation
+    error.
     """
     most = found.nonparametric is None and found.memory.correlated and found.memory.explained > MAJORITY
     named = found.naming.named
@@ -171,6 +173,6 @@ def after_all(
 
 
 def _explained(base: Model, best: Model, found: Examination) -> float:
-    """Of what a fit explains and of what the past tells beside it, as `found` from there, the fit's share."""
+    """The share of a fit's gain in the sum of it and of what correlated innovations still explain."""
     gain = 2.0 * (evidence_of(best.view) - evidence_of(base.view))
     return share_of(gain, found.memory.told if found.memory.correlated else 0.0)

@@ -11,10 +11,10 @@ from diagnosis_cases import recorded, wrong
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
-from jaxsub.discrepancy.generic import Pattern
 from jaxsub.discrepancy.model import fit_with
+from jaxsub.discrepancy.nonparametric import Pattern
 from jaxsub.discrepancy.selector import Selector
-from jaxsub.discrepancy.stand_in import described, freest
+from jaxsub.discrepancy.surrogate import largest_in_simulation, with_surrogate
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
 from jaxsub.discrepancy.whiteness import RANDOM, Memory
@@ -43,11 +43,15 @@ def test_stands_in_what_moves_the_vehicle_and_explains_enough_of_free_runs():
     stronger = QuadraticDamping("surge", -2.0)
     shares = [(0.3, 0.2, 0.5, 0.25), (0.0, 0.06, 0.5, 0.2), (0.0, 0.0, 0.5, 0.1)]
     good = lambda chosen, index: True
-    assert freest(Freely([surge, yaw, sensor, stronger], shares, good)) == [surge, yaw]
-    assert freest(Freely([surge, yaw, sensor, stronger], [shares[0], (0.0, 0.04, 0.5, 0.2)], good)) == [surge]
-    assert freest(Freely([surge, yaw], [(0.3, 0.2), (0.0, 0.0)], lambda chosen, index: index == 1)) == [yaw]
+    assert largest_in_simulation(Freely([surge, yaw, sensor, stronger], shares, good)) == [surge, yaw]
+    assert largest_in_simulation(Freely([surge, yaw, sensor, stronger], [shares[0], (0.0, 0.04, 0.5, 0.2)], good)) == [
+        surge
+    ]
+    assert largest_in_simulation(Freely([surge, yaw], [(0.3, 0.2), (0.0, 0.0)], lambda chosen, index: index == 1)) == [
+        yaw
+    ]
     turned = lambda chosen, index: not (chosen and index == 0)
-    assert freest(Freely([surge, yaw], [(0.3, 0.2), (0.3, 0.2), (0.0, 0.0)], turned)) == [yaw]
+    assert largest_in_simulation(Freely([surge, yaw], [(0.3, 0.2), (0.3, 0.2), (0.0, 0.0)], turned)) == [yaw]
 
 
 def seen(selector, memory, pattern=None, disturbance=None):
@@ -89,7 +93,7 @@ def test_a_description_joins_where_it_explains_some_of_what_is_left(
     led = dataclasses.replace(named.view, covariance=known * named.view.covariance)
     fitted = lambda fitter, model, effects, _: model._replace(fit=fit_of, view=led, added=(*model.added, *effects))
     monkeypatch.setattr(ModelFitter, "with_effects", fitted)
-    path = sys.modules["jaxsub.discrepancy.stand_in"]
+    path = sys.modules["jaxsub.discrepancy.surrogate"]
     again = Freely([], [()], lambda *_: True)
     fakes = {
         "is_admissible": lambda fit, effects: effects[0] is not yaw,
@@ -101,7 +105,7 @@ def test_a_description_joins_where_it_explains_some_of_what_is_left(
         monkeypatch.setattr(path, name, fake)
     fitter = object.__new__(ModelFitter)
     object.__setattr__(fitter, "progress", lambda message: None)
-    best, said = described(fitter, named, seen(selector, Memory(left, 1.0)), Judged("unknown", [], 1e-9, []), None)
+    best, said = with_surrogate(fitter, named, seen(selector, Memory(left, 1.0)), Judged("unknown", [], 1e-9, []), None)
     assert best.added == ((surge,) if stands else ())
     assert (best is named) is not stands
     assert said.verdict == "unknown"
@@ -137,11 +141,11 @@ def test_a_force_that_overdoes_it_is_tried_by_halves(monkeypatch, most, worse, a
         return Comparison(Gain(1.0, 1e-3 if after < most else 1.0, 0.5), NO_GAIN, 1.0 + worse / after, admissible)
 
     monkeypatch.setattr(ModelFitter, "with_effects", fitted)
-    path = sys.modules["jaxsub.discrepancy.stand_in"]
+    path = sys.modules["jaxsub.discrepancy.surrogate"]
     monkeypatch.setattr(path, "compare", gained)
     fitter = object.__new__(ModelFitter)
     left = seen(Freely([], [()], lambda *_: True), Memory(1e-9, 1.0), pattern, named.view.disturbance)
-    best, said = described(fitter, named, left, Judged("unknown", [], 1e-9, []), None)
+    best, said = with_surrogate(fitter, named, left, Judged("unknown", [], 1e-9, []), None)
     assert spreads == asked
     assert [effect.spread for effect in best.added] == ([] if stands is None else [stands])
     assert (best is named) is (stands is None)
@@ -164,7 +168,7 @@ def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, er
         return model._replace(fit=cheaper, added=(*model.added, *effects))
 
     monkeypatch.setattr(ModelFitter, "with_effects", fitted)
-    path = sys.modules["jaxsub.discrepancy.stand_in"]
+    path = sys.modules["jaxsub.discrepancy.surrogate"]
     monkeypatch.setattr(path, "with_coloured_errors", lambda view, fit: fit)
     monkeypatch.setattr(path, "compare", lambda *given: Comparison(Gain(1.0, 1e-3, 0.999), NO_GAIN, 0.5, True))
     monkeypatch.setattr(path, "listed", lambda *_: Freely([], [()], lambda *_: True))
@@ -172,7 +176,7 @@ def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, er
     selector = Freely([drag], [(0.3,), (0.0,)], lambda *_: True, named.view.disturbance)
     fitter = object.__new__(ModelFitter)
     object.__setattr__(fitter, "progress", lambda message: None)
-    best, _ = described(fitter, named, seen(selector, Memory(1e-9, 1.0)), Judged("named", [], 1e-9, []), None)
+    best, _ = with_surrogate(fitter, named, seen(selector, Memory(1e-9, 1.0)), Judged("named", [], 1e-9, []), None)
     assert best.added == (effect, drag)
     assert started == [True, False][: 1 + holds]
 

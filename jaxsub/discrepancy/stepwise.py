@@ -1,7 +1,7 @@
-"""Many effects that are missing at once, one look after the other, by what comes next.
+"""Stepwise selection of many missing effects by innovations, with replacement and backward elimination.
 
-A free run that errs for many causes asks for what does what all of these do. So innovations are asked what is missing
-and how large it is, until they ask for nothing more that is accepted; and free runs then judge it all.
+The simulation error of a model that lacks many effects favours candidates that imitate them all. So effects are
+selected and estimated by one-step-ahead prediction until none more is accepted, and simulation then judges the whole.
 """
 
 import dataclasses
@@ -11,9 +11,9 @@ import numpy as np
 
 from ..effects import AbstractEffect
 from .acceptance import CandidateModels, Model, ModelFitter, proposed_effects, without_insignificant
-from .ahead import Ahead, lacking, proved
 from .cross_validation import Comparison, compare
 from .examine import listed, weighed
+from .innovation_models import InnovationModels, selector_without, validated_in_simulation
 from .model import p_value
 from .name import Named, asked_still, named_on, refitted, standing
 from .rivals import told_apart
@@ -29,11 +29,11 @@ from .settings import (
 from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
 
 
-def by_what_comes_next(
+def stepwise_by_innovations(
     fitter: ModelFitter, base: Model, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged] | None:
-    """The model with what the next sample asks for, and what is to be said, if it is accepted as a whole."""
-    ahead = Ahead(fitter)
+    """The model that stepwise selection by innovations ends with, and the judgement; None if simulation rejects it."""
+    ahead = InnovationModels(fitter)
     search = _Search(ahead, ahead.begin(base), vocabulary)
     best, named = search.start, list[Named]()
     judged, fallen, refusals = NOTHING, set[str](), 0
@@ -45,7 +45,7 @@ def by_what_comes_next(
         chosen = proposed_effects(found, said)
         if not chosen:
             break
-        grown = search.grown(CandidateModels(ahead.with_effects, best, found), chosen, named)
+        grown = search.extended(CandidateModels(ahead.with_effects, best, found), chosen, named)
         if grown is None:
             fallen.add(selector.candidates[chosen[0]].label)
             refusals += 1
@@ -53,9 +53,9 @@ def by_what_comes_next(
         judged = both(judged, dataclasses.replace(said, named=[], notes=[]))
         best, named, refused = grown
         fallen |= refused
-        best, named = search.asked_again(best, named)
-    best, named, gains = asked_for(ahead, search.start, best, named)
-    whole = proved(fitter, base, best) if named else None
+        best, named = search.with_alternatives(best, named)
+    best, named, gains = backward_eliminated(ahead, search.start, best, named)
+    whole = validated_in_simulation(fitter, base, best) if named else None
     if whole is None:
         return None
     judged = settled(judged, named)
@@ -66,40 +66,39 @@ def by_what_comes_next(
 
 @dataclasses.dataclass(frozen=True)
 class _Search:
-    """What every step of one search has: how models are made, where it starts from, and what may be asked for."""
+    """What the steps of one selection share: how models are made, the model it starts from, and the vocabulary."""
 
-    ahead: Ahead
+    ahead: InnovationModels
     start: Model
     vocabulary: tuple[type[AbstractEffect], ...] | None
 
     def listed(self, model: Model, *, present: bool = False) -> Selector:
-        """What may be asked for on top of a model; or also what it has, if `present`."""
+        """The candidates on top of a model; with `present` also the effects that it has."""
         selector = listed(model.view, self.vocabulary, present=present)
         selector.lose_free_run()
         return selector
 
-    def grown(
+    def extended(
         self, models: CandidateModels, chosen: Sequence[int], named: Sequence[Named]
     ) -> tuple[Model, list[Named], set[str]] | None:
-        """The model with those of `chosen` and of what was `named` before that are accepted beside each other, if they
-        gain, and the labels of those rejected; or with the first of them alone where the others lead astray.
+        """The model with those of `chosen`, and of the effects `named` before, that are accepted beside each other.
 
-        One that is rejected takes none of the others along. What is chosen first does most, and of what is so large a
-        linear picture sees other things in its place.
+        With the labels of those rejected; None if nothing is gained. Where all of `chosen` together gain nothing, the
+        first, which is the largest, is tried alone: its linearisation error may have proposed the others.
         """
         before = models.model([])
         for some in [chosen, chosen[:1]][: len(chosen)]:
             kept = without_insignificant(models, some)
             more = [*named, *standing(models.found.selector, kept)]
-            model, stand, _ = asked_for(self.ahead, self.start, models.model(kept), more)
+            model, stand, _ = backward_eliminated(self.ahead, self.start, models.model(kept), more)
             if compare(before.predicted, model.predicted, model.significant).accepted:
                 return model, stand, {one.effect.label for one in more} - {one.effect.label for one in stand}
         return None
 
-    def asked_again(self, best: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
-        """The model with another in the place of a name, where that is more probable beside all others.
+    def with_alternatives(self, best: Model, named: Sequence[Named]) -> tuple[Model, list[Named]]:
+        """The model with effects replaced by alternatives that are more probable beside all others.
 
-        What was taken first may have stood in for what came after it, and others may do better beside that.
+        An effect selected first may have been a surrogate of one that was selected later.
         """
         said, every = [], self.listed(best, present=True)
         for one in named:
@@ -117,17 +116,17 @@ class _Search:
         return best, said
 
     def _without(self, best: Model, one: Named, *rival: AbstractEffect) -> Model:
-        """The model without a name, or with a rival in its place."""
-        return self.ahead.instead(self.start, best, one.effect.label, *rival)
+        """The model without one effect, or with a rival in its place."""
+        return self.ahead.replaced(self.start, best, one.effect.label, *rival)
 
     def _beside(self, best: Model, every: Selector, one: Named) -> tuple[Named, list[AbstractEffect]]:
-        """How probable a named effect is beside all others of a model, and what may stand in its place, the best first.
+        """The posterior probability of an effect beside all others of a model, and its rivals, the best first.
 
-        Asked of a linear picture without it, of which `every` lists all, or, where that does not even give back what
-        was taken from it, of a model.
+        By the linearisation without the effect, from `every`, which lists all candidates; or by a fit without it where
+        the linearisation does not restore the evidence of the effect itself.
         """
         whole = every.evidence.best([])[0]
-        for asked in (lambda: lacking(every, one.effect), lambda: self.listed(self._without(best, one))):
+        for asked in (lambda: selector_without(every, one.effect), lambda: self.listed(self._without(best, one))):
             selector = asked()
             scan = selector.scan([])
             own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
@@ -145,12 +144,12 @@ class _Search:
         return named_on(selector, [], number), [*others.values()][:RIVALS_FITTED]
 
 
-def asked_for(
-    ahead: Ahead, start: Model, best: Model, named: Sequence[Named]
+def backward_eliminated(
+    ahead: InnovationModels, start: Model, best: Model, named: Sequence[Named]
 ) -> tuple[Model, list[Named], dict[str, Comparison]]:
-    """The model with those of `named` that are accepted beside the others, and what is gained by each."""
+    """Backward elimination: the model with those of `named` that are accepted beside the others, and their gains."""
     while named and best.view.finite:
-        gains = {one.effect.label: ahead.without(best, one.effect) for one in named}
+        gains = {one.effect.label: ahead.gain_by(best, one.effect) for one in named}
         p_values = {one.effect.label: p_value(best.view, one.effect) for one in named}
         # first of all what is not significant, then what is not accepted, the least gain first
         asked = lambda label, gains=gains, p_values=p_values: (
@@ -162,5 +161,5 @@ def asked_for(
         if gains[worst].accepted and p_values[worst] < SIGNIFICANCE:
             return best, [*named], gains
         named = [one for one in named if one.effect.label != worst]
-        best = ahead.instead(start, best, worst)
+        best = ahead.replaced(start, best, worst)
     return start, [], {}

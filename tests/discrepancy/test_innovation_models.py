@@ -9,16 +9,16 @@ from rigs import oscillator
 
 from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.acceptance import Model, ModelFitter
-from jaxsub.discrepancy.ahead import Ahead, in_pieces, lacking, pieces_of
 from jaxsub.discrepancy.cross_validation import Predicted, one_step_ahead
 from jaxsub.discrepancy.evaluation import evaluated
 from jaxsub.discrepancy.evidence import evidence_of
 from jaxsub.discrepancy.examine import listed
+from jaxsub.discrepancy.innovation_models import InnovationModels, segmented, segments_needed, selector_without
 from jaxsub.discrepancy.innovation_search import InnovationSearch, with_wide_priors
-from jaxsub.discrepancy.many import asked_for, by_what_comes_next
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.restarts import restarted
 from jaxsub.discrepancy.settings import BLOCKS
+from jaxsub.discrepancy.stepwise import backward_eliminated, stepwise_by_innovations
 from jaxsub.discrepancy.view import led_from
 from jaxsub.effects import CubicStiffness, numbers
 from jaxsub.effects.actuator_curves import ActuatorDeadband
@@ -97,7 +97,7 @@ def test_a_free_run_begun_anew_is_the_motion_itself_where_nothing_is_wrong():
 def test_runs_are_cut_as_often_as_a_model_does_not_run_free_and_no_more():
     """Claim: free runs in the pieces chosen leave less than a tenth of the variance, and in half as many more."""
     view = view_of_truth()
-    pieces = pieces_of(view)
+    pieces = segments_needed(view)
     assert pieces is not None
 
     def left(count):
@@ -113,7 +113,7 @@ def test_a_view_that_lacks_an_effect_is_that_of_the_vehicle_without_it():
     vehicle, runs = true_pendulum().with_effect(CubicDamping("x", jnp.asarray(0.0))), batch(pendulum(), steered()[:2])
     view = led_from(vehicle, runs, SIGMA, [dataclasses.replace(STILL, force=jnp.array([1.0]))])
     effect = view.vehicle.effects[-1]
-    fewer = lacking(listed(view, None, present=True), effect).evidence.view
+    fewer = selector_without(listed(view, None, present=True), effect).evidence.view
     problem = with_wide_priors(Problem.of(fewer.vehicle, runs, SIGMA))
     anew = InnovationSearch(problem, problem.guess).evaluate(fewer.vehicle, view.disturbance)
     before, there, expected = (squares(one) for one in (view, fewer, anew))
@@ -125,7 +125,7 @@ def test_what_is_asked_for_in_the_place_of_an_effect_takes_no_other_pass_through
     """Claim: candidates mapped from those of the whole model have the evidence that they have from the view without."""
     view = view_of_truth()
     effect = view.vehicle.effects[0]
-    mapped = lacking(listed(view, None, present=True), effect)
+    mapped = selector_without(listed(view, None, present=True), effect)
     direct = listed(mapped.evidence.view, None)
     effects = [{(e.label, *numbers(e).values()): i for i, e in enumerate(s.candidates)} for s in (mapped, direct)]
     assert set(effects[1]) <= set(effects[0])
@@ -156,12 +156,12 @@ def begun():
 def test_what_is_not_asked_for_takes_nothing_else_along():
     """Claim: of two effects that are there and one that is not, only that one leaves the model."""
     fitter, base = begun()
-    ahead = Ahead(fitter)
+    ahead = InnovationModels(fitter)
     start = ahead.begin(base)
     there = [QuadraticDamping("x", jnp.asarray(-0.5)), CubicStiffness("x", jnp.asarray(2.0))]
     effects = [CubicDamping("x", jnp.asarray(-0.1)), *there]
     named = [Named(i, effect, 1.0, [], []) for i, effect in enumerate(effects)]
-    best, stand, gains = asked_for(ahead, start, ahead.with_effects(start, effects, STILL), named)
+    best, stand, gains = backward_eliminated(ahead, start, ahead.with_effects(start, effects, STILL), named)
     assert [one.effect.label for one in stand] == [effect.label for effect in there] == list(gains)
     assert {effect.label for effect in best.view.vehicle.effects} == {effect.label for effect in there}
     assert all(gain.accepted for gain in gains.values())
@@ -172,7 +172,7 @@ def test_what_falls_over_is_known_by_what_comes_next():
     truth, and free runs through the held-out run err far less."""
     fitter, base = begun()
     vocabulary = (QuadraticDamping, CubicDamping, CubicStiffness, ActuatorDeadband)
-    best, judged = by_what_comes_next(fitter, base, vocabulary)
+    best, judged = stepwise_by_innovations(fitter, base, vocabulary)
     assert sorted(one.effect.name for one in judged.named) == ["cubic-stiffness", "quadratic-damping"]
     errors = dict(
         zip([row.name for row in best.view.vehicle.layout.free], np.sqrt(np.diag(best.view.covariance)), strict=True)
@@ -181,6 +181,6 @@ def test_what_falls_over_is_known_by_what_comes_next():
         own = next(one for one in best.fit.vehicle.effects if isinstance(one, effect))
         (value,) = numbers(own).values()
         assert abs(value - true) < 3.0 * errors[f"{own.label}.{symbol}"]
-    again = in_pieces(base, best.pieces)
+    again = segmented(base, best.pieces)
     before, after = evaluated(pendulum(), steered()[:2], steered()[2:], [again, best], best.pieces)
     assert np.sum(after.squares[0]) < 0.1 * np.sum(before.squares[0])

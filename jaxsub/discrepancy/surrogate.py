@@ -1,10 +1,9 @@
-"""What has no name, described: effects that stand in for it in free runs, and a smooth force beside them.
+"""Surrogate terms: effects and a nonparametric force that improve the simulation of an unexplained mismatch.
 
-A name claims a cause, and needs evidence that it is this one and no other. A model is to be used all the same. So what
-makes its simulation better, in cross-validation, may stand in it and claims nothing: some effects of the
-vocabulary, and a smooth force of one variable. What was named is fitted again beside it, unless the two are so much
-alike, such as friction and any force of the rate, that the recordings would not tell its numbers any more: then it
-keeps them.
+A named effect claims a cause, and needs evidence against all others. A model is to be used all the same. So terms that
+improve simulation in cross-validation may be added without any claim: effects of the vocabulary, and a smooth force of
+one variable. Named effects are estimated again beside them, unless the two are nearly collinear, such as friction and a
+force of the rate: then they keep their parameters.
 """
 
 import dataclasses
@@ -32,16 +31,16 @@ from .settings import (
 from .verdict import Judged, helped, incomplete, standing_in
 
 
-def described(
+def with_surrogate(
     fitter: ModelFitter,
     named: Model,
     found: Examination,
     judged: Judged,
     vocabulary: tuple[type[AbstractEffect], ...] | None,
 ) -> tuple[Model, Judged]:
-    """A `named` model with what describes what has no name in the last look at it, and what is to be said.
+    """A `named` model with surrogate terms for what its last examination leaves unexplained, and the judgement.
 
-    Where the time is spent before, it is the `named` model.
+    Where time runs out before, it is the `named` model.
     """
     try:
         return _described(fitter, named, found, judged, vocabulary)
@@ -70,12 +69,12 @@ def _described(
 
 
 def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Selector) -> Model | None:
-    """The model with what free runs ask for most, if it is accepted.
+    """The model with the terms that explain most of its simulation error, if they are accepted.
 
-    What comes out of a fit with numbers that physics does not admit is asked for no more, and others instead; of what
-    does not help only the first half is tried again.
+    Terms with inadmissible fitted parameters are replaced by others. Of terms that are rejected only the first half is
+    tried again.
     """
-    asked = freest(selector)
+    asked = largest_in_simulation(selector)
     for _ in range(SURROGATE_FITS):
         if not asked:
             return None
@@ -83,7 +82,7 @@ def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Select
         wrong = {effect.label for effect in asked if not is_admissible(more.fit, [effect])}
         if wrong:
             selector.usable[[effect.label in wrong for effect in selector.candidates]] = False
-            asked = freest(selector)
+            asked = largest_in_simulation(selector)
         elif _worth(model, more):
             return more
         else:
@@ -92,9 +91,9 @@ def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Select
 
 
 def _worth(model: Model, more: Model) -> bool:
-    """Whether what stands in is accepted and removes some of the simulation error.
+    """Whether the surrogate terms are accepted and remove enough of the simulation error.
 
-    What hardly changes anything may do so significantly, and would then ask for a round of fits more.
+    A significant but negligible change would cost another round of fits.
     """
     gain = compare(model.predicted, more.predicted)
     better = gain.ratio < 1.0 - SURROGATE_GAIN and float(more.fit.cost) < float(model.fit.cost)
@@ -104,7 +103,7 @@ def _worth(model: Model, more: Model) -> bool:
 def _fitted(
     fitter: ModelFitter, named: Model, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance
 ) -> Model:
-    """The model with some effects, in which what was named is known about as well as it was, or keeps its numbers."""
+    """The model with surrogate terms; named effects whose standard errors would grow too much keep their values."""
     more = fitter.with_effects(model, effects, disturbance)
     own = [row.name for effect in named.added for row in parameter_table(effect).values()]
     free = [name for name in own if name in more.fit.names]
@@ -117,17 +116,17 @@ def _fitted(
 
 
 def _holding(model: Model, named: Model, names: Sequence[str]) -> Model:
-    """The model with some numbers held at what they are where they were named."""
+    """The model with some parameters held at their values in the `named` model."""
     values = named.fit.vehicle.values()
     held = lambda vehicle: vehicle.with_values({name: values[name] for name in names}).holding(names)
     fit = dataclasses.replace(model.fit, vehicle=held(model.fit.vehicle))
     return model._replace(fit=fit, view=dataclasses.replace(model.view, vehicle=held(model.view.vehicle)))
 
 
-def freest(selector: Selector) -> list[AbstractEffect]:
-    """What explains most of a free run's errors, one on top of the other, with the numbers that a free run predicts.
+def largest_in_simulation(selector: Selector) -> list[AbstractEffect]:
+    """The candidates that explain most of the simulation error, by forward selection, with predicted parameters.
 
-    Of what moves the vehicle: a sensor that is wrong is no description of it.
+    Sensor effects are left out: they do not describe the vehicle.
     """
     chosen: list[int] = []
     while len(chosen) < MOST_EFFECTS:
@@ -146,10 +145,10 @@ def freest(selector: Selector) -> list[AbstractEffect]:
 def _with_force(
     fitter: ModelFitter, named: Model, base: Model, found: Examination, judged: Judged
 ) -> tuple[Model, Judged]:
-    """The model with the force without a name, if it is accepted.
+    """The model with the nonparametric force, if it is accepted.
 
-    How far from zero it is was asked of its shape in detail, and its few knots may overdo it: so half of that is tried,
-    and less where free runs err less with it.
+    Its prior standard deviation was estimated with many knots and may be too wide for its few: so half of it is tried,
+    and less as long as the simulation error falls.
     """
     if found.pattern is None or not found.pattern.joins:
         return base, judged

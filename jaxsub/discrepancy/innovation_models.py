@@ -1,9 +1,8 @@
-"""Models by innovations alone: of a vehicle that does not run free for long, or that lacks many things at once.
+"""Models estimated by innovations alone: of unstable vehicles, or ones that lack many effects at once.
 
-Where the vehicle is unstable, as most are that an autopilot steers, a free run is lost within seconds whatever the
-model. A filter is held to what was measured, and numbers by its innovations come near the truth one effect after the
-other. What is found so is accepted if in the end free runs, begun anew as often as the model needs it, are better with
-all of it.
+The simulation of an unstable vehicle, as most are that an autopilot steers, diverges within seconds whatever the model.
+A filter follows the measurements, and parameters by its innovations approach the truth one effect after the other. The
+result is accepted if simulations, re-initialised as often as the model needs it, are better with all of it.
 """
 
 import dataclasses
@@ -31,16 +30,16 @@ from .view import View, led_from, look
 
 
 @dataclasses.dataclass(frozen=True)
-class Ahead:
-    """Models with the numbers that innovations have, compared one step ahead.
+class InnovationModels:
+    """Models with parameters estimated by innovations, compared by one-step-ahead prediction.
 
-    Their simulation errors are taken to be those of the model that they were begun from.
+    Their simulation errors are taken to be those of the model that they start from.
     """
 
     fitter: ModelFitter
 
     def begin(self, model: Model) -> Model:
-        """A model with its view's numbers."""
+        """A model with the parameters of its view."""
         return self._model(model, model.view, ())
 
     def with_effects(
@@ -50,7 +49,7 @@ class Ahead:
         disturbance: Disturbance,
         near: Sequence[AbstractVehicle] = (),
     ) -> Model:
-        """A model with `effects` more, its numbers moved from where they are, or from the first that are `near`."""
+        """A model with `effects` added, estimated from its own parameters or from the first vehicle `near`."""
         make_room()
         self.fitter.progress(f"following with {', '.join(effect.label for effect in effects)}")
         vehicle = near[0] if near else with_scaled_effects(model.view.vehicle, effects, 1.0)
@@ -60,8 +59,8 @@ class Ahead:
         view = led_from(vehicle, runs, model.view.sigma, disturbances)
         return self._model(model, view, effects)
 
-    def instead(self, start: Model, best: Model, label: str, *rival: AbstractEffect) -> Model:
-        """The `best` model, begun from `start`, without one effect, or with a `rival` in its place."""
+    def replaced(self, start: Model, best: Model, label: str, *rival: AbstractEffect) -> Model:
+        """The `best` model, which grew from `start`, without one effect or with a `rival` in its place."""
         vehicle = best.view.vehicle.without_effect(label)
         for effect in rival:
             vehicle = vehicle.with_effect(effect)
@@ -69,9 +68,9 @@ class Ahead:
         more = [effect for effect in vehicle.effects if effect.label not in before]
         return self.with_effects(start, more, best.view.disturbance, [vehicle])
 
-    def without(self, best: Model, effect: AbstractEffect) -> Comparison:
-        """What is gained by one of a model's effects, of which the columns are left out for the model without it."""
-        fewer = best.predicted._replace(one_step=one_step_ahead(lacking_view(best.view, effect)[0]))
+    def gain_by(self, best: Model, effect: AbstractEffect) -> Comparison:
+        """The gain by one of a model's effects, whose columns are left out for the model without it."""
+        fewer = best.predicted._replace(one_step=one_step_ahead(view_without(best.view, effect)[0]))
         return compare(fewer, best.predicted)
 
     def _model(self, model: Model, view: View, effects: Sequence[AbstractEffect]) -> Model:
@@ -82,21 +81,21 @@ class Ahead:
         return Model(ended, view, predicted, (*model.added, *effects), model.pieces)
 
 
-def lacking(selector: Selector, effect: AbstractEffect) -> Selector:
-    """What would be asked for in the place of one effect of a view's vehicle, by a linear picture from where it stands.
+def selector_without(selector: Selector, effect: AbstractEffect) -> Selector:
+    """The candidates without one effect of the vehicle, all others present, by the linearisation at its estimate.
 
-    Once all others are there. Of a selector that lists what is present too.
+    Of a selector that lists the effects present too.
     """
-    return selector.seen_from(*lacking_view(selector.evidence.view, effect))
+    return selector.seen_from(*view_without(selector.evidence.view, effect))
 
 
-def lacking_view(view: View, effect: AbstractEffect) -> tuple[View, np.ndarray]:
-    """A view of the vehicle without one effect, along the same path, and the (1 + p, 1 + m) sums of columns for it."""
+def view_without(view: View, effect: AbstractEffect) -> tuple[View, np.ndarray]:
+    """The view without one effect, on the same trajectory, and the (1 + p, 1 + m) sums of columns that lead to it."""
     rows, values = view.vehicle.layout.free, view.vehicle.values()
     own = [i for i, row in enumerate(rows) if row.name.startswith(f"{effect.label}.")]
     others = [i for i in range(len(rows)) if i not in own]
     keep = np.eye(1 + len(rows))[:, [0, *(1 + i for i in others)]]
-    # what it does now is no longer there, and so is in the residual
+    # its contribution is added to the residual
     for i in amplitude_indices(view, effect):
         keep[1 + i, 0] = float(values[rows[i].name]) * view.length[i]
     across = view.covariance[np.ix_(others, own)]
@@ -112,19 +111,19 @@ def lacking_view(view: View, effect: AbstractEffect) -> tuple[View, np.ndarray]:
     return fewer, keep
 
 
-def proved(fitter: ModelFitter, base: Model, best: Model) -> Model | None:
-    """The `best` model of innovations as it is simulated, if it is accepted beside `base`.
+def validated_in_simulation(fitter: ModelFitter, base: Model, best: Model) -> Model | None:
+    """The `best` model by innovations in simulation, if it is accepted against `base`; else None.
 
-    Fitted to free runs if it runs free, else begun anew as often as it has to be: to where a free run of an unstable
-    vehicle is lost a search finds numbers that suit it no more than others.
+    It is fitted in simulation if it is stable enough, else its simulation is re-initialised as often as needed: where
+    the simulation of an unstable vehicle diverges, its error identifies nothing.
     """
-    fitter.progress(f"free runs with {', '.join(effect.label for effect in best.added)}")
-    pieces = pieces_of(best.view)
+    fitter.progress(f"simulating with {', '.join(effect.label for effect in best.added)}")
+    pieces = segments_needed(best.view)
     if pieces is None:
         return None
     before, after = base, best
     if pieces > 1:
-        before, after = (in_pieces(model, pieces) for model in (base, best))
+        before, after = (segmented(model, pieces) for model in (base, best))
     else:
         fit = refit(best.fit, best.view.vehicle)
         view = look(fit, best.view.disturbance)
@@ -132,8 +131,8 @@ def proved(fitter: ModelFitter, base: Model, best: Model) -> Model | None:
     return after if compare(before.predicted, after.predicted, after.significant).accepted else None
 
 
-def pieces_of(view: View) -> int | None:
-    """Into how few pieces its recordings are cut, if any, that free runs through each leave little of the motion."""
+def segments_needed(view: View) -> int | None:
+    """The least number of segments of each run in which simulations follow most of the motion; None if none does."""
     runs, measured = view.runs, [view.measured(channel) for channel in view.vehicle.layout.channels]
     variance = np.array([np.var(values) if len(values) else np.inf for values in measured])
     pieces = 1
@@ -146,8 +145,8 @@ def pieces_of(view: View) -> int | None:
     return None
 
 
-def in_pieces(model: Model, pieces: int) -> Model:
-    """A model with its view's numbers, whose free runs are begun anew in every piece from what its filter says."""
+def segmented(model: Model, pieces: int) -> Model:
+    """A model with its view's parameters whose simulation is re-initialised in every segment by its filter."""
     view = model.view
     runs, start = view.runs.segments(pieces), starts(view.followed, pieces)
     ended = Ended(view.vehicle, runs, start, view.sigma, model.fit.cost, model.fit.steps, SUCCESSFUL)
