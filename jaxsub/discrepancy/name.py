@@ -1,9 +1,9 @@
-r"""Which physics was left out: forward selection with backward elimination by evidence, and the rivals' probabilities.
+r"""Forward selection with backward elimination by log evidence, and posterior probabilities of effects and rivals.
 
-Nothing is refitted for a selection: along the motion that took place the recordings are close to linear in the
-coefficients, in the amplitudes and in small changes of lags and the like, so a set of effects is judged by its block of
-one matrix of products. The probability of an effect is its evidence over that of all that may stand in its place, the
-others chosen held; equal before the data for every name, and within a name for every form.
+Nothing is refitted for a selection: about the filtered trajectory the innovations are close to linear in coefficients,
+amplitudes and small changes of lags and the like, so the evidence of a set of effects is a function of its block of one
+matrix of products. The posterior probability of an effect is its evidence over that of all its alternatives, the other
+selected effects held. A priori every name is equally probable, and within a name every form.
 """
 
 import dataclasses
@@ -33,13 +33,13 @@ from .settings import (
 
 @dataclasses.dataclass(frozen=True)
 class Named:
-    """An effect chosen.
+    """A selected effect.
 
     **Fields**
 
-    - `number`: of the candidate; `effect`: with its predicted numbers; `probability`: of its name.
-    - `rivals`: with their probabilities. `twins`: numbers of rivals to be fitted, which a linear picture
-      cannot tell from it or finds more probable.
+    - `number`: of the candidate; `effect`: with its predicted parameters; `probability`: posterior, of its name.
+    - `rivals`: with their posterior probabilities. `twins`: numbers of rivals to be fitted, which are nearly collinear
+      with it or more probable.
     """
 
     number: int
@@ -51,15 +51,15 @@ class Named:
 
 @dataclasses.dataclass(frozen=True)
 class Naming:
-    """What was chosen, and how.
+    """The result of a selection.
 
     **Fields**
 
-    - `named`: with probabilities, in the order of choice.
-    - `products`: at the disturbance that is left. `columns`: of what was chosen. `value`: its log evidence.
-    - `again`: whether a free run asked for the last, so that one should look again with it in the model.
-    - `first`: the scan before any choice; `candidates`: its lines for the report.
-    - `first_p`: family-wise p-value of the largest score before any choice.
+    - `named`: with posterior probabilities, in the order of selection.
+    - `products`: under the disturbance that is left. `columns`: of the selected effects. `value`: their log evidence.
+    - `again`: whether the last was selected by simulation, so that all is to be examined again with it in the model.
+    - `first`: the scan before any selection; `candidates`: its lines for the report.
+    - `first_p`: family-wise p-value of the largest score before any selection.
     """
 
     named: list[Named]
@@ -73,11 +73,11 @@ class Naming:
 
 
 def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan], list[float]]:
-    """Candidates chosen one after the other; the scans before each choice and at the end; the p-values of each best.
+    """The selected candidates, the scans before each selection and at the end, and the p-value of each best.
 
-    One that does not help to predict a part of the recordings from the others is passed over: a model that is wrong in
-    other ways finds in any flexible enough effect something to fit, but not the same thing everywhere. One that a free
-    run asks for ends the search: what a model that errs so much says of smaller things is not to be trusted.
+    A candidate that does not improve the prediction of parts of the recordings by the others is passed over: a flexible
+    effect fits any misfit, but not the same in every part. One that was selected by simulation ends the selection: with
+    so large a simulation error, scores of smaller effects are not to be trusted.
     """
     chosen: list[int] = []
     scans, p_values = [], []
@@ -101,9 +101,9 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
 
 
 def _settled(selector: Selector, chosen: list[int]) -> Scan:
-    """The scan once the leaders' own disturbances are known: what a rival leaves to a disturbance must not count.
+    """The scan with the disturbances estimated for the leading candidates, each beside `chosen`.
 
-    Where none gains, also those of what may be hidden in the disturbance.
+    Where none gains, also for candidates that the disturbance may have absorbed.
     """
     scan = _led(selector, chosen)
     if np.max(scan.value) > selector.value(chosen):
@@ -114,7 +114,7 @@ def _settled(selector: Selector, chosen: list[int]) -> Scan:
 
 
 def _led(selector: Selector, chosen: list[int]) -> Scan:
-    """The scan once the best, or the first few that were, have their own disturbances estimated."""
+    """The scan with the disturbance estimated for the best candidate, or for the first few that were."""
     for _ in range(DISTURBANCE_ESTIMATES):
         scan = selector.scan(chosen)
         best = int(np.argmax(scan.value))
@@ -127,7 +127,7 @@ def _led(selector: Selector, chosen: list[int]) -> Scan:
 
 
 def _without_idle(selector: Selector, chosen: list[int]) -> list[int]:
-    """`chosen` less those that the others make idle."""
+    """Backward elimination: `chosen` less those without which the log evidence is larger."""
     while len(chosen) > 1:
         whole = selector.value(chosen)
         less = [selector.value([c for c in chosen if c != i]) for i in chosen]
@@ -139,7 +139,7 @@ def _without_idle(selector: Selector, chosen: list[int]) -> list[int]:
 
 
 def name(selector: Selector, progress: Progress) -> Naming:
-    """The effects that the recordings ask for, with probabilities."""
+    """The selected effects with their posterior probabilities."""
     chosen, scans, _ = select(selector, progress)
     value, products = selector.evidence.best(selector.columns(chosen))
     named = standing(selector, chosen)
@@ -150,12 +150,12 @@ def name(selector: Selector, progress: Progress) -> Naming:
 
 
 def standing(selector: Selector, chosen: Sequence[int], refused: Collection[int] = ()) -> list[Named]:
-    """Each of some candidates with its probability and rivals, the others of them in the model."""
+    """Each of some candidates with its posterior probability and rivals, the others of them in the model."""
     return [named_on(selector, [i for i in chosen if i != index], index, refused) for index in chosen]
 
 
 def named_on(selector: Selector, others: Sequence[int], index: int, refused: Collection[int] = ()) -> Named:
-    """The probability of a candidate on top of `others`, and of what might stand there and was not `refused`."""
+    """A candidate on top of `others` with its posterior probability and rivals, less those `refused`."""
     scan = selector.scan(others)
     out = {selector.candidates[i].name for i in refused} - {selector.candidates[index].name}
     may = selector.stand_in(others, index) & np.array([effect.name not in out for effect in selector.candidates])
@@ -166,7 +166,7 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     weights = special.softmax(log)
     own, label = selector.candidates[index].name, selector.candidates[index].label
     by_name: dict[str, float] = {}
-    # of its own effect the best in every place: elsewhere it is no rival, but may be a twin
+    # of its own effect the best in every equation: in another it is no rival, but may be collinear
     best: dict[str, int] = {}
     for i, (effect, weight) in enumerate(zip(selector.candidates, weights, strict=True)):
         by_name[effect.name] = by_name.get(effect.name, 0.0) + float(weight)
@@ -174,14 +174,13 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
         if log[i] > log[best.setdefault(key, i)]:
             best[key] = i
     rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > RIVAL_PROBABILITY]
-    # what coefficients absorb of an effect, they absorb of the picture's errors too, but not as exactly
+    # coefficients absorb the linearisation error as they absorb the effect, but not as exactly
     off = min(MOST_SCORE_ERROR, SCORE_ERROR / np.sqrt(max(selector.kept[index], 1e-12)))
     near = [j for key, j in best.items() if key != label and np.isfinite(log[j])]
     place = scan.effects[index].where
-    # where a motion is no larger than its noise, a picture along it gives the square of a rate too much and its cube
-    # too little
+    # where a motion is no larger than its noise, the filtered trajectory favours the square of a rate over its cube
     least = lambda j: MAJORITY if scan.effects[j].where == place else 1.0 - off
-    # a free run may ask for what is less probable sample by sample than a rival, which then is tried before it
+    # simulation may select what is less probable by innovations than a rival, which then is fitted first
     alike = lambda j: scan.statistic[j] > least(j) * scan.statistic[index] or log[j] > log[index]
     near = [j for j in near if alike(j)]
     twins = sorted(near, key=lambda j: -log[j])[:RIVALS_FITTED]
@@ -189,9 +188,9 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
 
 
 def asked_still(selector: Selector, others: Sequence[int], index: int, scan: Scan) -> Bool[np.ndarray, " m"]:
-    """(m,) whether each candidate of a `scan` on top of `others` is asked for still with `index` in the model.
+    """(m,) whether each candidate of a `scan` on top of `others` is significant still with `index` in the model.
 
-    Where many are missing another may do as much and be no rival.
+    Then it is missing too, and no rival.
     """
     beside = selector.scan([*others, index])
     asked = np.array([selector.p_value(i, beside) < SIGNIFICANCE for i in range(len(beside.value))])
@@ -199,7 +198,7 @@ def asked_still(selector: Selector, others: Sequence[int], index: int, scan: Sca
 
 
 def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Named:
-    """A chosen effect with the probabilities of it and its twins by the log evidence of fits, others' as they were."""
+    """A selected effect with posterior probabilities by the log evidence of fits; those not fitted keep theirs."""
     own = [v for effect, v in values if effect.name == named.effect.name]
     if not own:
         return named

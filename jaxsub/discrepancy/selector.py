@@ -1,4 +1,4 @@
-"""What every candidate effect would add to those already chosen, and which of them to take next."""
+"""The gain of every candidate on top of those already selected, and which of them to select next."""
 
 import collections
 import copy
@@ -47,7 +47,7 @@ class Scan:
 
 
 class _WithAmplitudes(Sequence[AbstractEffect]):
-    """Candidates with predicted amplitudes, each made when it is asked for: few ever are."""
+    """Candidates with predicted amplitudes, each made when it is read: few ever are."""
 
     def __init__(self, candidates: Sequence[AbstractEffect], sizes: Sequence[np.ndarray]):
         self._candidates, self._sizes = candidates, sizes
@@ -75,7 +75,7 @@ class Selector:
     ):
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
         own = evidence.view.disturbance
-        # a free run has no disturbance to put errors down to
+        # a simulation has no disturbance that could absorb its error
         still = Disturbance(NEGLIGIBLE * own.force, own.time, np.ones_like(own.noise))
         self.free = evidence.under(still)
         self.lost = False
@@ -89,7 +89,7 @@ class Selector:
         self._begin()
 
     def _begin(self) -> None:
-        """Nothing is estimated, and what the coefficients absorb or the vehicle has is not to be asked for."""
+        """Nothing is estimated; what the coefficients absorb or the vehicle has is no candidate."""
         self.estimated: set[tuple[int, ...]] = set()
         self.freely: set[int] = set()
         self.kept = self.evidence.products[0].kept(self.owners)
@@ -101,7 +101,7 @@ class Selector:
         self.tests = independent_tests(squares, asked, 1.0 / self.evidence.products[0].samples)
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Selector":
-        """The same candidates asked of a view that `Evidence.seen_from` takes."""
+        """The same candidates for a view that `Evidence.seen_from` takes."""
         other = copy.copy(self)
         other.evidence, other.free = self.evidence.seen_from(view, keep), self.free.seen_from(keep)
         other._begin()
@@ -112,11 +112,11 @@ class Selector:
         return [column for i in chosen for column in self.owners[i]]
 
     def value(self, chosen: Sequence[int]) -> float:
-        """Log evidence at the best disturbance, and how probable such forms are before the data."""
+        """Log evidence under the best disturbance plus log prior probability."""
         return self.evidence.best(self.columns(chosen))[0] + float(np.sum(self.prior[list(chosen)]))
 
     def estimate(self, chosen: Sequence[int]) -> None:
-        """Find the disturbance that is left with `chosen` in the model."""
+        """Estimate the disturbance with `chosen` in the model."""
         key = tuple(sorted(chosen))
         if key not in self.estimated:
             self.estimated.add(key)
@@ -124,7 +124,7 @@ class Selector:
             self.evidence.products.append(self.evidence.estimate(own, self.evidence.best(own)[1].disturbance))
 
     def scan(self, chosen: Sequence[int], under: Products | None = None) -> Scan:
-        """Every candidate on top of `chosen`, at the disturbance of some products or at the best."""
+        """Every candidate on top of `chosen`, under the disturbance of some products or under the best."""
         own = self.columns(chosen)
         among = self.evidence.products if under is None else [under]
         base = max(products.log_evidence(own) for products in among)
@@ -151,35 +151,35 @@ class Selector:
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
 
     def hidden(self, chosen: Sequence[int]) -> list[int]:
-        """What leads on top of `chosen` where less is put down to the disturbance, and may have been put down to it."""
+        """The best candidates on top of `chosen` under smaller disturbances, which may have absorbed them."""
         scans = [self.scan(chosen, under) for under in self.evidence.products[1:FIRST]]
         leaders = {int(np.argmax(scan.value)): float(np.max(scan.value)) for scan in scans}
         return [index for index, value in leaders.items() if np.isfinite(value)]
 
     def of_free_run(self, chosen: Sequence[int]) -> np.ndarray:
-        """(m,) the share of what `chosen` leave of a free run's errors that each candidate explains."""
+        """(m,) the share of the simulation error left by `chosen` that each candidate explains."""
         return self.free.explained(self.columns(chosen), self.owners)
 
     def freely_valued(self) -> tuple[np.ndarray, float]:
-        """(m,) log evidence of a free run's errors with each candidate alone, as `value`, and with none."""
+        """(m,) log evidence of the simulation error with each candidate alone, as `value`, and with none."""
         without = self.free.log_evidence([])
         return without + self.free.gains([], self.owners).evidence + self.prior, without
 
     def freely_predicted(self, chosen: Sequence[int], index: int) -> tuple[AbstractEffect, bool]:
-        """A candidate with the numbers that a free run predicts beside `chosen`, and whether physics admits them."""
+        """A candidate with the parameters that simulation predicts beside `chosen`, and whether physics admits them."""
         own = self.owners[index]
         size = self.free.gains(self.columns(chosen), [own]).amplitudes[0]
         return predict(self.candidates[index], size / self.evidence.length[own])
 
     def lose_free_run(self) -> None:
-        """Ask no free run any more: what it asked for was refused, and errors that grew so long have other causes."""
+        """Select by simulation no more: its selection was rejected, and accumulated errors have other causes."""
         self.lost = True
         self.freely.clear()
 
     def foremost(self, chosen: Sequence[int], scan: Scan) -> int:
-        """Which candidate to take next: the most probable, unless a free run asks for another and hardly for it.
+        """Which candidate to select next: the most probable, unless it explains little of the simulation error.
 
-        What happens within a few samples is told by very many of them, and may be of no importance later.
+        Then the one that explains most of it: fast dynamics show in very many samples, and may not matter for long.
         """
         best = int(np.argmax(scan.value))
         share = self.of_free_run(chosen)
@@ -193,12 +193,12 @@ class Selector:
         return best
 
     def _asked(self, chosen: Sequence[int], scan: Scan) -> np.ndarray:
-        """(m,) whether the recordings ask for each candidate on top of `chosen`, if not for it most."""
+        """(m,) whether each candidate on top of `chosen` is significant and gains evidence."""
         p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
         return (scan.value > self.value(chosen)) & (p_values < SIGNIFICANCE)
 
     def ruling(self) -> np.ndarray:
-        """(m,) the share of a free run's errors, far above the noise, that each candidate alone explains.
+        """(m,) the share of a simulation error far above the noise that each candidate alone explains.
 
         0 where it is not most of them, or where the recordings do not ask for the candidate.
         """
@@ -209,10 +209,9 @@ class Selector:
         return np.where((share > MAJORITY) & self._asked([], self.scan([])), share, 0.0)
 
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
-        """(m,) whether each candidate may stand where `index` does, on top of `chosen`.
+        """(m,) whether each candidate is an alternative to `index` on top of `chosen`.
 
-        Where a free run asked for it, those that leave much more of the free run's errors may not, nor those that
-        explain much less.
+        Where simulation selected it, those are none that leave much more of the simulation error or explain much less.
         """
         if index not in self.freely:
             return np.ones(len(self.candidates), bool)
@@ -220,24 +219,24 @@ class Selector:
         return (1.0 - share <= SIMULATION_RATIO * (1.0 - share[index])) & (share >= share[index] / SIMULATION_RATIO)
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
-        """Whether `more` helps to predict parts of the recordings, or of a free run that asked, from the others."""
+        """Whether `more` improves the prediction of parts of the recordings by the others, or of a simulation."""
         before, after = self.columns(chosen), self.columns([*chosen, more])
         free = more in self.freely
         without, with_it = (self.free if free else self.evidence.best(columns)[1] for columns in (before, after))
         return bool(np.sum(with_it.predicted(after)) > np.sum(without.predicted(before)))
 
     def p_value(self, index: int, scan: Scan) -> float:
-        """Of a candidate's χ², family-wise: that so small a p-value is the smallest of all candidates' by chance."""
+        """Of a candidate's χ², family-wise: the probability of so small a smallest p-value of all under the null."""
         own = self.forms[index] * special.chdtrc(len(self.owners[index]), scan.statistic[index])
         return family_wise(float(own), self.tests)
 
     def smallest_p_value(self, scan: Scan) -> float:
-        """Of all candidates' χ², family-wise; uniform where nothing is missing beside what a scan is on top of."""
+        """Of all candidates' χ², family-wise; uniform under the null."""
         return min((self.p_value(int(i), scan) for i in np.flatnonzero(self.usable)), default=1.0)
 
 
 def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:
-    """An effect with predicted numbers, and whether physics admits them."""
+    """An effect with predicted parameters, and whether physics admits them."""
     values = _predicted_numbers(effect, amplitude)
     return with_numbers(effect, values) if values else effect, predictable(effect, amplitude)
 

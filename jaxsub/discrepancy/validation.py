@@ -29,7 +29,7 @@ def remainders(
     layout: Layout,
     sigma: Float[np.ndarray, " c"],
 ) -> dict[str, Remainder]:
-    """By channel what a model leaves of `recordings`: its free runs' `error` in SI, made up to one length.
+    """By channel the simulation `error` of a model on `recordings`, SI, padded to one length.
 
     Inputs are all that drives the model: actuators, prescribed motions and surroundings.
     """
@@ -47,7 +47,7 @@ def remainders(
 
 
 def beyond_noise(left: dict[str, Remainder], rms: dict[str, float], layout: Layout) -> list[str]:
-    """One line: the channels of stated noise in which free runs leave more than it, which is not random either."""
+    """One line: the channels of stated noise whose simulation error is larger than it and correlated."""
     stated = [output.channel for output in layout.outputs if output.sigma is not None]
     found = [c for c in stated if left[c].low > 1.0 and left[c].random < RESIDUAL_LEVEL]
     led = lambda one: f", with {one.follows}" if one.independent < RESIDUAL_LEVEL else ""

@@ -1,4 +1,4 @@
-"""What the evidence amounts to: none, named, ambiguous or unknown."""
+"""The verdict by all decisions: none, named, ambiguous or unknown."""
 
 import dataclasses
 import math
@@ -16,9 +16,9 @@ from .whiteness import Memory
 
 @dataclasses.dataclass(frozen=True)
 class Judged:
-    """A verdict, the effects that stand, the mismatch's p-value, notes for the reader, and every decision in order.
+    """A verdict, the accepted effects, the mismatch's p-value, notes for the reader, and every decision in order.
 
-    It is not `complete` where the time was spent before all was tried.
+    It is not `complete` where time ran out before all was tried.
     """
 
     verdict: Verdict
@@ -33,7 +33,7 @@ NOTHING = Judged("none", [], 1.0, [])
 
 
 def both(earlier: Judged, later: Judged) -> Judged:
-    """What is to be said once a model with what stands of `earlier` was looked at again, or others were asked."""
+    """The judgement of two rounds, the later one with the accepted effects of the earlier in its model."""
     named, notes = [*earlier.named, *later.named], [*earlier.notes, *later.notes]
     missed: Verdict = "unknown" if earlier.verdict == "unknown" else later.verdict
     verdict = _certainty(named) if named else missed
@@ -44,7 +44,7 @@ def both(earlier: Judged, later: Judged) -> Judged:
 def judge(naming: Naming, pattern: Pattern | None, memory: Memory) -> Judged:
     """The verdict before anything was fitted."""
     follows = pattern is not None and pattern.significant
-    # a scan that no choice followed was either not significant or predicted nothing
+    # a scan that no selection followed was either not significant or predicted nothing
     least = naming.first_p if naming.named or pattern is None or not follows else min(naming.first_p, pattern.p_value)
     p_value: float = min(1.0, 2.0 * least)
     labels = ", ".join(named.effect.label for named in naming.named)
@@ -66,7 +66,7 @@ def judge(naming: Naming, pattern: Pattern | None, memory: Memory) -> Judged:
 
 
 def _tests(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory) -> list[Decision]:
-    """What was significant in a first look."""
+    """The tests of one examination."""
     choice = "proposed" if naming.named else "not proposed"
     score = "p-value of the largest score, corrected for all candidates"
     said = [Decision(labels or "mismatch", score, naming.first_p, SIGNIFICANCE, choice)]
@@ -142,20 +142,20 @@ def incomplete(judged: Judged) -> Judged:
 
 
 def by_fit(judged: Judged, share: float) -> Judged:
-    """The verdict on names that said too little by a linear picture, with the share of it that their fit explains."""
+    """The verdict on effects whose fit explains more than the linearisation did, with that share."""
     labels = ", ".join(one.effect.label for one in judged.named)
     return dataclasses.replace(judged, notes=[*judged.notes, f"Fitted, {labels} explains {share:.0%} of it."])
 
 
 def standing_in(judged: Judged, effects: Sequence[AbstractEffect]) -> Judged:
-    """The verdict with a word on effects that are in the model and were not named."""
+    """The verdict with a note on surrogate terms in the model."""
     labels = ", ".join(effect.label for effect in effects)
-    note = f"Simulation errors are smaller with {labels}, a surrogate for what has no name."
+    note = f"Simulation errors are smaller with {labels}, a surrogate for unknown physics."
     return dataclasses.replace(judged, notes=[*judged.notes, note])
 
 
 def by_all(judged: Judged, pieces: int) -> Judged:
-    """The verdict on many effects found one step ahead, which simulation accepts, each run cut into `pieces`."""
+    """The verdict on effects found by innovations and accepted in simulation, re-initialised in `pieces` of a run."""
     note = "These effects were found by innovations, and are accepted together by the simulation error."
     if pieces > 1:
         note += f" The model cannot be simulated for long: simulation starts anew in each of {pieces} parts of a run."
@@ -171,9 +171,9 @@ def idle(judged: Judged, label: str, others: Sequence[str], gain: Comparison) ->
 
 
 def settled(judged: Judged, stand: list[Named]) -> Judged:
-    """The verdict once everything was tried: named by what stands.
+    """The verdict once everything was tried: named by the accepted effects.
 
-    Where nothing does, a mismatch that is beyond doubt is unknown, and any other was luck.
+    Where none is accepted, a significant mismatch is unknown, and any other is none.
     """
     if stand:
         return dataclasses.replace(judged, named=stand, verdict=_certainty(stand))

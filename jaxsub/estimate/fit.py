@@ -189,8 +189,8 @@ def fit(
     """Fit the free numbers of `vehicle`, and an initial state for each run, to `runs`.
 
     `method` is Gauss–Newton where none is given; where that does not run or arrive, also from the end of a filter, and
-    the more probable is taken. A free run of an unstable model is soon lost, while a filter is held to what was
-    measured; the numbers that it comes to allow for what is missing. `sigma` overrides the file's noise; `start` is
+    the more probable is taken. The simulation of an unstable model diverges, while a filter follows the
+    measurements, and its estimates allow for missing physics. `sigma` overrides the file's noise; `start` is
     where the initial states' search begins, or with `known_start` what they are. A failure is a value in `Fit.result`,
     no exception. `passes` is told how many passes over long runs are done and expected (`AbstractMethod.run`).
     """

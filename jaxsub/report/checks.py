@@ -29,7 +29,7 @@ Models = dict[str, Remainder]
 
 
 def draw_checks(diagnosis: Diagnosis) -> Picture | None:
-    """Correlations of what free runs leave of unseen runs, of the channels that `draw_overlay` shows; None without."""
+    """Correlations of the simulation errors of test runs, of the channels that `draw_overlay` shows; None without."""
     overlay = telling_overlay(diagnosis)
     names = affected_channels(diagnosis, overlay) if overlay else []
     left = {name: {model: known[name] for model, known in diagnosis.remains.items()} for name in names}
