@@ -244,7 +244,7 @@ class Asked:
         }
         for name, fake in fakes.items():
             monkeypatch.setattr(path, name, fake)
-        self.explained = path.explained
+        self.search = path.search_structure
 
     def found(self):
         found = looked(SimpleNamespace(named=[0], again=False))
@@ -258,7 +258,7 @@ class Asked:
     def answer(self):
         """What is said, and whether there is something left to describe."""
         fit = SimpleNamespace(result=self.result)
-        _, said, left = self.explained(silent(), Model(fit, None, None, ()), self.found(), None)
+        _, said, left = self.search(silent(), Model(fit, None, None, ()), self.found(), None)
         return said, left is not None
 
 
