@@ -70,6 +70,8 @@ def vehicle_from(
         top.table("coefficients"), kind == "submerged-body", devices.input_units
     )
     numbers = body | coefficients | devices.numbers
+    # those with a symbol have their units by it
+    named = [name for name in names if name in devices.input_units and not (body and name in INPUT_UNITS)]
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
     built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
     return build(
@@ -83,7 +85,7 @@ def vehicle_from(
         system=system,
         ties=(*ties, *devices.ties),
         inputs=inputs,
-        input_units={name: unit for name, unit in devices.input_units.items() if name not in INPUT_UNITS},
+        input_units={name: devices.input_units[name] for name in named},
         actuators=devices.actuators,
         prescribed=read_pairs(top.table("prescribed")),
         environment=read_pairs(top.table("environment")),

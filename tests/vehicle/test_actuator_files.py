@@ -241,6 +241,17 @@ def test_columns_are_taken_in_the_unit_of_their_actuator():
             check_units(layout, [run(**{column: unit})])
 
 
+def test_unit_of_a_mechanism_s_input_is_checked_too():
+    """Claim: also of an input named as one of a body, and the file that is written states it."""
+    tree = tomllib.loads(RIG) | {"inputs": {"thrust": {"column": "u", "unit": "V"}}}
+    tree["coefficients"] = {"I_x": 2.0, "K_x": 3.0, "B_x_thrust": 1.0}
+    vehicle = vehicle_from(tree, "rig.toml")
+    assert 'thrust = {column = "u", unit = "V"}' in vehicle_text(vehicle)
+    check_units(vehicle.layout, [run(u="mV", x="m")])
+    with pytest.raises(InputError, match="run, column 'u': newton is not the unit of a quantity in volt"):
+        check_units(vehicle.layout, [run(u="N", x="m")])
+
+
 def test_accepted_stage_is_written_as_the_key_of_its_actuator():
     """Claim: a rate limit before the file's lag stays an effect, a lag after its rate limit becomes the key; both move
     the vehicle as before when read back."""

@@ -4,6 +4,7 @@ import copy
 import dataclasses
 import math
 import tomllib
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -70,6 +71,8 @@ inputs = { motor = "u" }
 outputs = { x = { sigma = 0.1 }, y_rate = {} }
 effects = [{ effect = "coulomb-friction", equation = "x", smoothing = 0.1 }]
 """
+ACTUATED = (Path(__file__).parent / "earlier" / "actuators.toml").read_text(encoding="utf-8")
+FILES = pytest.mark.parametrize("text", [BODY, RIG, ACTUATED], ids=["body", "rig", "actuated"])
 fuzz = settings(
     derandomize=True, deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
@@ -138,7 +141,7 @@ def test_text_that_strains_a_parser(tmp_path, text):
     from_text(tmp_path / "vehicle.toml", text)
 
 
-@pytest.mark.parametrize("text", [BODY, RIG], ids=["body", "rig"])
+@FILES
 @fuzz
 @given(
     edits=st.lists(
@@ -153,7 +156,9 @@ def test_a_file_with_typing_errors(tmp_path, text, edits):
 
 
 numbers = st.floats() | st.integers() | st.sampled_from([0, -1, 1e308, 10**400, float("nan"), float("inf")])
-words = st.sampled_from(["", "surge", "pitch", "x", "rudder", "theta", "mechanism", "submerged-body", "density", "X_u"])
+words = st.sampled_from(
+    ["", "surge", "pitch", "x", "rudder", "theta", "mechanism", "submerged-body", "density", "X_u", "port", "thruster"]
+)
 leaves = numbers | st.booleans() | words | st.text(max_size=3) | st.none()
 trees = st.recursive(leaves, lambda t: st.lists(t, max_size=3) | st.dictionaries(words, t, max_size=2), max_leaves=5)
 
@@ -181,7 +186,7 @@ def with_other_values(text, data):
     return tree
 
 
-@pytest.mark.parametrize("text", [BODY, RIG], ids=["body", "rig"])
+@FILES
 @fuzz
 @given(data=st.data())
 def test_a_file_with_other_values_in_it(text, data):
@@ -190,7 +195,7 @@ def test_a_file_with_other_values_in_it(text, data):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("text", [BODY, RIG], ids=["body", "rig"])
+@FILES
 @settings(fuzz, max_examples=10_000)
 @given(data=st.data())
 def test_many_files_with_other_values_in_them(text, data):
