@@ -3,11 +3,9 @@
 import dataclasses
 from typing import Literal
 
-from ..effects import CHANNEL_UNITS
 from ..vehicle import Layout
 
 Role = Literal["held input", "prescribed", "measured"]
-_INPUT_UNITS = {"thrust": "N", "shaft_speed": "rad/s"}
 _ENVIRONMENT_UNITS = {"density": "kg/m³", "temperature": "K", "altitude": "m", "ballast": "m³", "current_north": "m/s",
                       "current_east": "m/s"}  # fmt: skip
 # Euler angles, in which a whole turn makes no difference
@@ -36,7 +34,7 @@ class Channel:
 def channels_of(layout: Layout) -> tuple[Channel, ...]:
     """Every column that a vehicle of `layout` takes from a recording, once; as an input where it is measured too."""
     body = layout.kind == "submerged-body"
-    found = [Channel(column, name, "held input", _input_unit(name, body)) for name, column in layout.inputs]
+    found = [Channel(column, name, "held input", layout.input_unit(name)) for name, column in layout.inputs]
     found += [Channel(column, name, "prescribed", layout.unit(name)) for name, column in layout.prescribed]
     found += [
         Channel(column, name, "prescribed", _ENVIRONMENT_UNITS.get(name, "") if body else "")
@@ -50,8 +48,3 @@ def channels_of(layout: Layout) -> tuple[Channel, ...]:
     for channel in found:
         first.setdefault(channel.name, channel)
     return tuple(first.values())
-
-
-def _input_unit(name: str, body: bool) -> str:
-    # all actuators of a body that do not push are fins
-    return _INPUT_UNITS.get(name, CHANNEL_UNITS["phi"]) if body else ""

@@ -12,7 +12,7 @@ from ..likelihood import Disturbance
 from ..vehicle import AbstractVehicle
 from .cross_validation import Comparison, Predicted, compare, one_step_ahead, simulated
 from .evidence import evidence_of
-from .model import are_significant, fit_with, is_admissible, p_value, refit
+from .model import are_significant, fit_with, is_admissible, p_value, refit, with_scaled_effects
 from .name import Named, Naming, named_on, refitted, standing
 from .nonparametric import Pattern, most_explained
 from .programs import make_room
@@ -113,7 +113,7 @@ class ModelFitter:
         if substeps > joined.runs.substeps:
             runs = dataclasses.replace(joined.runs, substeps=substeps)
             joined = refit(dataclasses.replace(joined, runs=runs), joined.vehicle)
-        view = look(joined, disturbance)
+        view = look(joined, disturbance, with_scaled_effects(model.view.vehicle, effects, 1.0))
         return fitted_model(joined, view, (*model.added, *effects))
 
 

@@ -70,7 +70,7 @@ def diagnose(
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
         raise InputError(vehicle.layout.name, "the model does not run from its starting values", remedy)
     progress("following the recordings")
-    view = look(start, file=vehicle)
+    view = look(start, near=vehicle)
     if not view.finite:
         remedy = "bound the coefficient that makes it unstable, or sample more often"
         raise InputError(vehicle.layout.name, "the model diverges when it is led along the recordings", remedy)

@@ -24,10 +24,12 @@ from scipy.linalg import block_diag
 from ..estimate import estimate_disturbance
 from ..likelihood import Columns, Disturbance, padded_width
 from .columns import force_columns
-from .innovation_search import root_or_one
+from .innovation_search import DISTURBANCE_STEPS, root_or_one
 from .settings import DISTURBANCE_SHARES, MOST_COLUMNS
 from .view import View
 
+# rounds of scoring steps in which a disturbance is estimated
+_ROUNDS = 3
 # products that evidence begins with
 FIRST = len(DISTURBANCE_SHARES)
 
@@ -237,7 +239,8 @@ class Evidence:
         picked = jax.tree.map(lambda column: np.where(filled, column, 0.0), picked)
         worth = np.where(filled, 1.0 / self.products[0].samples, 1.0)
         prior = np.asarray(block_diag(self.view.prior, np.diag(worth)))
-        found = estimate_disturbance(self.view.followed.system, self.view.base + picked, prior, start)
+        system, columns = self.view.followed.system, self.view.base + picked
+        found = estimate_disturbance(system, columns, prior, start, steps=DISTURBANCE_STEPS, rounds=_ROUNDS)
         return self.under(jax.tree.map(np.asarray, found))
 
     def left(self, chosen: Sequence[int], products: Products) -> Columns:

@@ -127,16 +127,17 @@ class View:
         return np.asarray(self.runs.outputs)[..., column][np.asarray(self.runs.mask)[..., column]]
 
 
-def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle | None = None) -> View:
+def look(fit: Fit, disturbance: Disturbance | None = None, near: AbstractVehicle | None = None) -> View:
     """The view of a fit, its free parameters and disturbance re-estimated by innovations.
 
-    The disturbance starts from a guess by the residuals, or from the given one where that is better: after a fit that
-    explains more, the guess is far too large.
+    The disturbance starts from a guess by the residuals, or from the given one, of a view of nearly the same model,
+    where that is better.
 
-    Where a fit leaves errors far above the noise, the search is a multi-start one, whose better half goes on after each
-    alternation. Parameters start from the fit and from the `file`: a fit without the missing physics may be in an
-    optimum that nothing leads out of. Its initial states are not trusted either, and the filter begins at their prior.
-    The misfit is first attributed to forces, or to sensors: forces that follow a faulty sensor bias all others.
+    Where a fit leaves errors far above the noise, parameters start too from a vehicle that is `near`, such as that of
+    the file: a fit without the missing physics may be in an optimum that nothing leads out of. Its initial states are
+    not trusted either, and the filter begins at their prior. Without a disturbance given, the search is then a
+    multi-start one, whose better half goes on after each alternation: the misfit is first attributed to forces, or to
+    sensors, since forces that follow a faulty sensor bias all others.
 
     Parameters of the file have a wide prior. Without a velocity log, say, the recordings hardly identify some, and
     values a hundred times too large could absorb an actuator's force.
@@ -145,14 +146,16 @@ def look(fit: Fit, disturbance: Disturbance | None = None, file: AbstractVehicle
     much = max(rms.values()) > LARGE_ERROR
     search = InnovationSearch(problem, problem.guess if much else fit.start)
     guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.spread), noise=_white(fit))
-    vehicles, starts, doubted = [fit.vehicle], [[guess] if disturbance is None else [guess, disturbance]], []
-    if much:
-        vehicles += [file] if file is not None else []
-        in_sensors, doubted = _doubting(guess, np.array([rms[c] for c in fit.vehicle.layout.channels]))
-        starts.append([in_sensors])
+    vehicles = [fit.vehicle, *([near] if much and near is not None else [])]
     best = lambda pairs: by_cost(search.evaluate(*pair) for pair in pairs)[0]
-    iterates = [best([(v, start) for start in some]) for v in vehicles for some in starts]
-    iterates += by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
+    if disturbance is not None:
+        iterates = [best([(v, start) for v in vehicles for start in (guess, disturbance)])]
+    elif much:
+        in_sensors, doubted = _doubting(guess, np.array([rms[c] for c in fit.vehicle.layout.channels]))
+        iterates = [search.evaluate(v, start) for v in vehicles for start in (guess, in_sensors)]
+        iterates += by_cost(best([(v, start) for v in vehicles]) for start in doubted)[:_DOUBTED]
+    else:
+        iterates = [search.evaluate(fit.vehicle, guess)]
     while len(iterates) > 1:
         iterates = distinct(search.alternated(iterate) for iterate in iterates)
         iterates = iterates[: max(1, len(iterates) // 2)]

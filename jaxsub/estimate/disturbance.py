@@ -15,14 +15,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values, namespace
 from ..likelihood import Columns, Disturbance, System, covariance_derivatives, products, restricted
 from .damped import Damped
 from .problem import Expansion
 
-_STEPS = 4
+_STEPS = 10
 # a gain of log likelihood that nothing depends on
 _ENOUGH = 0.1
 # standard deviations of weak priors on the logarithms of q, τ and κ: without them an absent force has no optimum
@@ -44,26 +44,45 @@ class _Given(NamedTuple):
 
 
 def estimate_disturbance(
-    system: System, columns: Columns, prior: Float[Values, "p1 p1"], start: Disturbance
+    system: System,
+    columns: Columns,
+    prior: Float[Values, "p1 p1"],
+    start: Disturbance,
+    *,
+    steps: int = _STEPS,
+    rounds: int = 1,
 ) -> Disturbance:
     """The disturbance of largest restricted likelihood, or a better one than `start` where that is far from it.
 
     The first of the `columns` is the residual; `prior` as for `restricted`. Priors hold it loosely to the `start`, and
-    its time constants below half the longest run.
+    its time constants below half the longest run. It takes at most so many `steps`, for which it is compiled, in each
+    of so many `rounds`; in `jit` only one.
     """
     known = len(prior)
     whole = -(-known // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
     xp = namespace(prior)
     filled = xp.pad(prior, (0, whole - known)) + xp.diag(np.repeat([0.0, 1.0], [known, whole - known]))
-    return _search(system, columns.padded(whole), filled, start)
+    found, columns = start, columns.padded(whole)
+    for left in reversed(range(rounds)):
+        found, done = _search(system, columns, filled, start, found, steps)
+        if left and bool(done):
+            break
+    return found
 
 
 @eqx.filter_jit
-def _search(system: System, columns: Columns, prior: Array, start: Disturbance) -> Disturbance:
-    centre = jnp.log(jnp.concatenate([start.force, start.time, start.noise]))
-    given = _Given(system, columns, prior, centre)
+def _search(
+    system: System, columns: Columns, prior: Array, centre: Disturbance, begin: Disturbance, steps: int
+) -> tuple[Disturbance, Bool[Array, ""]]:
+    """At most so many `steps` from `begin`, with priors about `centre`, and whether they arrived."""
+    given = _Given(system, columns, prior, _logarithms(centre))
     solver = Damped(_expand, _ENOUGH, _FARTHEST)
-    return _parts(given, optx.minimise(_cost, solver, centre, given, max_steps=_STEPS, throw=False).value)
+    end = optx.minimise(_cost, solver, _logarithms(begin), given, max_steps=steps, throw=False)
+    return _parts(given, end.value), end.result == optx.RESULTS.successful
+
+
+def _logarithms(disturbance: Disturbance) -> Array:
+    return jnp.log(jnp.concatenate([disturbance.force, disturbance.time, disturbance.noise]))
 
 
 def _parts(given: _Given, y: Array) -> Disturbance:

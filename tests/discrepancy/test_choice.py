@@ -79,7 +79,7 @@ def test_a_fit_that_went_astray_is_looked_at_from_the_file_too():
     """Claim: from numbers that a fit might have run away to, with their signs turned, the file's lead back."""
     gone = astray(batch(wrong(), recorded(None, 2)[:2]), -20.0, "Z_q", "M_w")
     assert max(gone.rms.values()) > 2.0
-    found = look(gone, file=wrong()).vehicle.values()
+    found = look(gone, near=wrong()).vehicle.values()
     for row in wrong().layout.free:
         assert float(found[row.name]) == pytest.approx(float(dsrv().values()[row.name]), rel=0.2), row.name
 

@@ -34,7 +34,7 @@ def test_what_leads_is_of_the_kind_that_was_concealed(kind):
     """Claim: its probability is above 0.95; beside it the true numbers are not refused, and wrong ones are."""
     effect = CONCEALED[kind]
     start = baseline(recorded(effect, 5)[:2])
-    view = look(start, file=wrong())
+    view = look(start, near=wrong())
     found = examine(view, KINDS, lambda message: None)
     said = leading(found)
     assert next(iter(said)) == kind and said[kind] > 0.95

@@ -25,20 +25,20 @@ def fitted():
 
 def led_to(times):
     """A search that ends at forces so many `times` larger than it began with."""
-    return lambda system, columns, prior, start: dataclasses.replace(start, force=times * start.force)
+    return lambda system, columns, prior, start, **steps: dataclasses.replace(start, force=times * start.force)
 
 
 def test_a_turn_leads_to_nothing_less_probable(fitted, monkeypatch):
     """Claim: a search for the disturbance that ends far off changes nothing; where half its way is right, half."""
     found = look(fitted)
-    monkeypatch.setattr(leading, "estimate_disturbance", led_to(1.0))
+    monkeypatch.setattr(innovation_search, "estimate_disturbance", led_to(1.0))
     still = evidence_of(look(fitted, found.disturbance))
-    monkeypatch.setattr(leading, "estimate_disturbance", led_to(1e8))
+    monkeypatch.setattr(innovation_search, "estimate_disturbance", led_to(1e8))
     assert evidence_of(look(fitted, found.disturbance)) > still - 0.5
     # a hundred times too large at first, and a step of ten thousand down: all of it is too far, half is right
     large = dataclasses.replace(found.disturbance, force=100.0 * found.disturbance.force)
     monkeypatch.setattr(view, "_guessed", lambda *given: large)
-    monkeypatch.setattr(leading, "estimate_disturbance", led_to(1e-4))
+    monkeypatch.setattr(innovation_search, "estimate_disturbance", led_to(1e-4))
     half = look(fitted)
     assert float(half.disturbance.force[0] / found.disturbance.force[0]) == pytest.approx(1.0, rel=1e-6)
 
@@ -102,10 +102,10 @@ def test_a_step_is_the_least_within_its_bounds():
     columns = rng.standard_normal((40, 4)) + 2.0 * rng.standard_normal((40, 1))
     gram = (whole := np.column_stack([columns @ [3.0, -2.0, 1.0, 0.5], columns])).T @ whole
     left = lambda step: step @ gram[1:, 1:] @ step - 2.0 * step @ gram[1:, 0]
-    free = leading._step(gram, 0.0, np.full(4, -np.inf), np.full(4, np.inf))
+    free = innovation_search._step(gram, 0.0, np.full(4, -np.inf), np.full(4, np.inf))
     assert free == pytest.approx([3.0, -2.0, 1.0, 0.5])
     low, high = np.full(4, -1.0), np.full(4, 1.0)
-    step = leading._step(gram, 0.0, low, high)
+    step = innovation_search._step(gram, 0.0, low, high)
     assert np.all((step >= low) & (step <= high))
     assert left(step) < left(np.clip(free, low, high)) - 1.0
     assert all(left(step) <= left(point) for point in rng.uniform(low, high, (2000, 4)))

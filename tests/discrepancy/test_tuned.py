@@ -17,7 +17,7 @@ LINE = 2.0 * np.pi / (SAMPLES * INTERVAL)
 
 
 def seen(effect):
-    view = look(fit(wrong(), batch(wrong(), recorded(effect, 5)[:2])), file=wrong())
+    view = look(fit(wrong(), batch(wrong(), recorded(effect, 5)[:2])), near=wrong())
     return view, facts(view)
 
 
