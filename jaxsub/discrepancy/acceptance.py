@@ -196,8 +196,8 @@ class CandidateModels:
         The best comes first, insignificant ones come last: beside a coefficient that does the same, an effect may be
         insignificant and as probable as its rival.
         """
-        twins = [number for number in named_on(self.found.selector, others, index).twins if number not in others]
-        numbers = [index, *twins]
+        named = named_on(self.found.selector, others, index)
+        numbers = [index, *(number for number in named.collinear if number not in others)]
         predicted = [self.model([*others, i]).predicted for i in numbers]
         values = told_apart([self.log_evidence([*others, i]) for i in numbers], predicted)
         fits = zip(numbers, values, strict=True)

@@ -85,7 +85,7 @@ def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[
 
 @quietly
 def differences(view: View, effects: Sequence[AbstractEffect]) -> list[np.ndarray]:
-    """What each of `effects` as it stands adds: a force (2, R, K-1, n), or to the channels (R, K, c)."""
+    """What each of `effects` adds with its own parameters: a force (2, R, K-1, n), or to the channels (R, K, c)."""
     vehicle, path = view.vehicle, view.path
     forces = iter(actuator_forces(vehicle, path, [e for e in effects if isinstance(e, AbstractActuator)]))
     memories = [effect for effect in effects if isinstance(effect, AbstractMemory)]

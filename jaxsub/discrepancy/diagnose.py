@@ -37,7 +37,7 @@ from .validation import beyond_noise
 from .verdict import Judged
 from .view import View, look
 
-# told each answer before the last: the diagnosis, which is not `complete`, and the improved vehicle
+# receives each answer before the last: the diagnosis, which is not `complete`, and the improved vehicle
 Keep = Callable[[Diagnosis, AbstractVehicle], object]
 
 
@@ -56,12 +56,12 @@ def diagnose(
     """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `test`.
 
     Nothing of the runs `test` takes part in a decision: the models are simulated along them once, at the end. Returns
-    the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` is told what is
-    being done. After `budget` seconds, or once `stop()` is true, no further effect is tried, and the answer so far is
+    the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` receives what
+    is being done. After `budget` seconds, or once `stop()` is true, no further effect is tried, and the answer so far is
     given, which then is not `complete`. Each answer on the way is given to `keep`: one more effect was accepted, and
     the test runs were not looked at yet. Effects to `begin` with, as of an earlier answer, come before any other, if
     they are accepted together. **Raises** `InputError` where the recordings lack a column, the model does not run from
-    the vehicle file's values or diverges along the recordings, or `begin` has what the recordings cannot ask for.
+    the vehicle file's values or diverges along the recordings, or `begin` has effects that are no candidates.
     """
     until = limited(progress, budget, stop)
     progress("fitting the baseline")
@@ -73,7 +73,7 @@ def diagnose(
     view = look(start, near=vehicle)
     if not view.finite:
         remedy = "bound the coefficient that makes it unstable, or sample more often"
-        raise InputError(vehicle.layout.name, "the model diverges when it is led along the recordings", remedy)
+        raise InputError(vehicle.layout.name, "the model diverges in a filter of the recordings", remedy)
     found = examine(view, vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
@@ -169,7 +169,7 @@ def _findings(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> tupl
 
 
 def _where(judged: Judged, found: Examination, field: Field, train: Sequence[Recording]) -> list[Location]:
-    """The mismatch's places: where accepted effects act, or where the force without a name does, else as located."""
+    """The mismatch's places: where accepted effects act, or where the nonparametric force does, else as located."""
     if judged.verdict == "none":
         return []
     share, view = field.share, found.view
@@ -187,7 +187,7 @@ def _became(
 ) -> list[Candidate]:
     """The candidates of the first look with what became in the end of those that stand and of their rivals."""
     became = {rival.label: "rival" for found in physics for rival in found.rivals}
-    became |= {effect.label: "stands in, its cause unclaimed" for effect in standing}
+    became |= {effect.label: "surrogate, its cause unclaimed" for effect in standing}
     became |= {found.label: "accepted" for found in physics}
     return [dataclasses.replace(one, outcome=became.get(one.label, one.outcome)) for one in candidates]
 

@@ -65,7 +65,7 @@ class Rival:
 class Physics:
     """An accepted effect. `probability` is that of its name, over all of its forms.
 
-    `trades` has the numbers of others that the recordings tell hardly apart from its own, with their correlation.
+    `trades` has other parameters whose estimates are correlated with its own, with their correlation.
     """
 
     effect: str
@@ -99,7 +99,7 @@ class Candidate:
 
 @dataclasses.dataclass(frozen=True)
 class ForceTrace:
-    """The generalised force that one run asks for beyond the model, by equation, and its 1-σ band (N or N m)."""
+    """The generalised force that the model lacks in one run, by equation, and its 1-σ band (N or N m)."""
 
     run: str
     times: np.ndarray
@@ -267,7 +267,7 @@ class Diagnosis:
 
     @property
     def improves(self) -> bool:
-        """Whether the improved model is another than the baseline: an effect was named, or stands in without a name."""
+        """Whether the improved model is another than the baseline: an effect was named, or a surrogate added."""
         return len(self.history) > 1
 
     @property

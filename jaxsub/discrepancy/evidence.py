@@ -1,4 +1,4 @@
-r"""How probable the recordings are with some candidates in the model and under some disturbance.
+r"""The log evidence of the recordings with some candidates in the model and under some disturbance.
 
 With whitened residual r, columns J of the free parameters and S of chosen candidates, amplitudes a of a Gaussian prior
 that is worth one sample ($\pi = 1/N$ in units of each column's length), what the data say is
@@ -80,7 +80,7 @@ class Products:
     def predicted(self, chosen: Sequence[int]) -> np.ndarray:
         """(m,) log probability of each part of the recordings by the others, which leave every number some room.
 
-        At the numbers that the others like best, what they hardly tell would count as a wrong prediction.
+        At the estimates by the others, parameters that these hardly identify would count as wrong predictions.
         """
         at = np.ix_([0, *self._index(chosen)], [0, *self._index(chosen)])
         return conditional(self._with_priors(chosen), self.parts[:, *at], self.spreads)

@@ -1,14 +1,12 @@
-r"""What kind of thing is wrong: the vehicle's structure, an actuator, a sensor, the environment, or the file's numbers.
+r"""The posterior probability of each kind of mismatch: structure, actuator, sensor, environment, or the file's values.
 
-Where effects were accepted, something of a kind is missing unless each of them, or its true rival, is of another. Where
-none was, what a first look at the recordings finds most of speaks. Of each kind the evidence is then the mean over its
-effects, every name as probable as any other before the data; that of `disturbance` is the evidence of random forces and
-noise alone. Structure has the force without a name among its own. Where a free run asked for what leads, it is the
-evidence of a free run: a few samples would say something else.
+Where effects were accepted, a kind is missing unless each of them, or its true rival, is of another. Where none was, it
+is by the first examination: the evidence of a kind is the mean over its effects, every name equally probable a priori;
+that of `disturbance` is the evidence of the disturbance and noise alone. Structure includes the nonparametric force.
+Where simulation selected the leading effect, it is the evidence of the simulation error.
 
-Whether the file's numbers are right is asked of the model with what it lacked: a coefficient that has to do without
-the physics strays. $\chi^2 = d^TC^{-1}d$, d from the numbers that the recordings ask for to the file's and C the
-covariance of those.
+The file's values are tested in the model with the accepted effects, since missing physics biases coefficients:
+$\chi^2 = d^TC^{-1}d$, d from the estimates to the file's values and C the covariance of the estimates.
 """
 
 from collections.abc import Sequence

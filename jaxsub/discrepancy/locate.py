@@ -1,4 +1,4 @@
-"""Where and when a recording differs from the model: the generalised force that it asks for, and sensors and actuators.
+"""Where and when a recording differs from the model: the missing generalised force, sensors and actuators.
 
 In each equation the disturbance of a view is smoothed: the force given all samples, with its band. How much of the
 mismatch lies in an equation is what the recordings lose in likelihood when its disturbance is taken away; how much at a
@@ -47,7 +47,7 @@ class Field:
 
 
 def traces(view: View, recordings: Sequence[Recording]) -> list[ForceTrace]:
-    """The force that each of `recordings` asks for beyond the model."""
+    """The force that the model lacks in each of `recordings`."""
     mean, spread = missing_force(view)
     found = []
     for run, recording in enumerate(recordings):
@@ -117,7 +117,7 @@ def locations(field: Field, view: View, recordings: Sequence[Recording], share: 
 
 
 def _regime(view: View, clear: Sequence[np.ndarray]) -> Regime | None:
-    """What the samples of each run at which a force stands `clear` of its band have in common."""
+    """What the samples of each run at which a force is `clear` of its band have in common."""
     variables = regime_variables(view.path.start)
     shape = next(iter(variables.values())).shape if variables else (len(clear), 0)
     inside, live = np.zeros(shape, bool), np.zeros(shape, bool)
@@ -132,7 +132,7 @@ def _regime(view: View, clear: Sequence[np.ndarray]) -> Regime | None:
 
 
 def _clear(trace: ForceTrace, equation: str, signals: Sequence[NoiseSignal]) -> np.ndarray:
-    """The samples (K,) at which a force stands clear of its band; less clear where a filter agrees."""
+    """The samples (K,) at which a force exceeds its band; of fewer sigmas where the filter agrees."""
     size = np.abs(trace.force[equation]) / np.maximum(trace.band[equation], 1e-300)
     clear = size > FORCE_SIGMAS
     for signal in signals:

@@ -1,4 +1,4 @@
-r"""The next manoeuvre: the inputs, within limits, whose recording would best tell rival explanations apart.
+r"""The next manoeuvre: the inputs, within limits, whose recording would best separate rival explanations.
 
 What is maximised is the smallest separation over the pairs of rivals (`separation.py`), each refitted: the expected
 $\chi^2$ by which the wrong one misses what the right one recorded. L-BFGS by gradient through the rivals themselves,
@@ -70,7 +70,7 @@ def separating_manoeuvre(
     steps: int = 60,
     seed: int = 0,
 ) -> Manoeuvre:
-    """The inputs that best tell `models` apart, each the vehicle with one rival effect fitted to what `like` is of.
+    """The inputs that best separate `models`, each the vehicle with one rival effect fitted to what `like` is of.
 
     The manoeuvre begins where `like` does, measures the same channels, each in the same share of the samples, with
     noise `sigma` (c,) SI, and keeps `limits`, by default `recorded_limits`. It lasts `duration` s, sampled every
@@ -150,7 +150,7 @@ def _judged(
 ) -> tuple[Float[Array, "b k m"], Float[Array, "b r r"], Float[Array, " b"]]:
     """Inputs, drawn to the recorded ones as far as channels ask; their separations; the part of their limits they take.
 
-    Where the recorded inputs themselves leave a limit, no more is asked than to be as near to it as they are.
+    Where the recorded inputs themselves leave a limit, it is enough to be as near to it as they are.
     """
     toward = rivals.anchor + _PARTS[:, None, None] * (tried[:, None] - rivals.anchor)
     taken = jnp.max(jax.vmap(jax.vmap(rivals.excess))(toward), axis=(2, 3), initial=0.0)
@@ -203,7 +203,7 @@ def _recording(vehicle: AbstractVehicle, like: Recording, times: np.ndarray, inp
 def _require_rivals(models: Sequence[AbstractVehicle]) -> None:
     """Raise `InputError` unless `models` are two or more of one vehicle that has an actuator."""
     if len(models) < 2:
-        raise InputError("models", f"{len(models)} was given", "give the rivals that are to be told apart")
+        raise InputError("models", f"{len(models)} was given", "give the rivals that are to be separated")
     layout = models[0].layout
     if not layout.held:
         raise InputError(f"vehicle {layout.name!r}", "has no actuator", "a manoeuvre moves one")

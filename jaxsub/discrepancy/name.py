@@ -38,15 +38,15 @@ class Named:
     **Fields**
 
     - `number`: of the candidate; `effect`: with its predicted parameters; `probability`: posterior, of its name.
-    - `rivals`: with their posterior probabilities. `twins`: numbers of rivals to be fitted, which are nearly collinear
-      with it or more probable.
+    - `rivals`: with their posterior probabilities. `collinear`: numbers of rivals to be fitted, those
+      nearly collinear with it or more probable.
     """
 
     number: int
     effect: AbstractEffect
     probability: float
     rivals: list[tuple[AbstractEffect, float]]
-    twins: list[int]
+    collinear: list[int]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -160,7 +160,7 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     out = {selector.candidates[i].name for i in refused} - {selector.candidates[index].name}
     may = selector.stand_in(others, index) & np.array([effect.name not in out for effect in selector.candidates])
     if index not in selector.freely:
-        may &= ~asked_still(selector, others, index, scan)
+        may &= ~significant_beside(selector, others, index, scan)
     may[index] = True
     log = np.where(may, scan.value, -np.inf)
     weights = special.softmax(log)
@@ -183,11 +183,12 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     # simulation may select what is less probable by innovations than a rival, which then is fitted first
     alike = lambda j: scan.statistic[j] > least(j) * scan.statistic[index] or log[j] > log[index]
     near = [j for j in near if alike(j)]
-    twins = sorted(near, key=lambda j: -log[j])[:RIVALS_FITTED]
-    return Named(index, scan.effects[index], min(1.0, by_name[own]), sorted(rivals, key=lambda rival: -rival[1]), twins)
+    collinear = sorted(near, key=lambda j: -log[j])[:RIVALS_FITTED]
+    rivals = sorted(rivals, key=lambda rival: -rival[1])
+    return Named(index, scan.effects[index], min(1.0, by_name[own]), rivals, collinear)
 
 
-def asked_still(selector: Selector, others: Sequence[int], index: int, scan: Scan) -> Bool[np.ndarray, " m"]:
+def significant_beside(selector: Selector, others: Sequence[int], index: int, scan: Scan) -> Bool[np.ndarray, " m"]:
     """(m,) whether each candidate of a `scan` on top of `others` is significant still with `index` in the model.
 
     Then it is missing too, and no rival.

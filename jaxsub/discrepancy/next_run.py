@@ -1,4 +1,4 @@
-"""The manoeuvre that would settle an ambiguous diagnosis: its rivals fitted, and the inputs that tell them apart."""
+"""The manoeuvre that would settle an ambiguous diagnosis: its rivals fitted, and inputs that separate them."""
 
 from collections.abc import Sequence
 
@@ -10,12 +10,12 @@ from .batch import batch
 from .diagnosis import Diagnosis
 from .manoeuvre import Manoeuvre, separating_manoeuvre
 
-# s: a longer one costs more than it tells
+# s: a longer one costs more than it separates
 _LONGEST = 120.0
 
 
 def next_run(diagnosis: Diagnosis, train: Sequence[Recording]) -> Manoeuvre | None:
-    """The inputs whose recording would best tell the diagnosis' explanations of the runs `train` apart.
+    """The inputs whose recording would best separate the diagnosis' explanations of the runs `train`.
 
     It begins as the first of them, within the limits that it kept. None where nothing is ambiguous or nothing can be
     moved.

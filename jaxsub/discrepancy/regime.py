@@ -1,4 +1,4 @@
-"""In which regime a mismatch stands out: a variable, and the side of a threshold, that its intervals have in common."""
+"""The regime of a mismatch: a variable, and the side of a threshold, that its intervals have in common."""
 
 from collections.abc import Mapping
 
@@ -17,7 +17,7 @@ Variables = Mapping[str, Float[np.ndarray, "r k"]]
 
 
 def regime_variables(motion: Motion) -> dict[str, Float[np.ndarray, "r k"]]:
-    """What regimes are told by: speed, incidence and all that a force may follow, by size where both signs occur."""
+    """The variables of regimes: speed, incidence and the variables of a force, by size where both signs occur."""
     named = {name: np.asarray(value) for name, value in by_name(motion).items()}
     flow = [named[name] for name in ("u", "v", "w") if name in named]
     if len(flow) == 3:
@@ -48,8 +48,8 @@ def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.
     if reached < REGIME_AREA - 0.5:
         return None
     rng = np.random.default_rng(0)
-    luck = [np.max(np.abs(_areas(ranks, _moved(inside, live, rng)[live]) - 0.5)) >= reached for _ in range(_SHIFTS)]
-    if (1 + np.sum(luck)) / (1 + _SHIFTS) > LEVEL:
+    exceeded = [np.max(np.abs(_areas(ranks, _moved(inside, live, rng)[live]) - 0.5)) >= reached for _ in range(_SHIFTS)]
+    if (1 + np.sum(exceeded)) / (1 + _SHIFTS) > LEVEL:
         return None
     return _parted(names[best], variables[names[best]][live], inside[live], bool(areas[best] > 0.5))
 

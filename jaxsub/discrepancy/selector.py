@@ -185,14 +185,14 @@ class Selector:
         share = self.of_free_run(chosen)
         if self.lost or share[best] > MINOR_SHARE:
             return best
-        asked = self._asked(chosen, scan) & (share > MAJOR_SHARE)
-        if not np.any(asked):
+        major = self._significant(chosen, scan) & (share > MAJOR_SHARE)
+        if not np.any(major):
             return best
-        best = int(np.argmax(np.where(asked, share, -np.inf)))
+        best = int(np.argmax(np.where(major, share, -np.inf)))
         self.freely.add(best)
         return best
 
-    def _asked(self, chosen: Sequence[int], scan: Scan) -> np.ndarray:
+    def _significant(self, chosen: Sequence[int], scan: Scan) -> np.ndarray:
         """(m,) whether each candidate on top of `chosen` is significant and gains evidence."""
         p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
         return (scan.value > self.value(chosen)) & (p_values < SIGNIFICANCE)
@@ -200,13 +200,13 @@ class Selector:
     def ruling(self) -> np.ndarray:
         """(m,) the share of a simulation error far above the noise that each candidate alone explains.
 
-        0 where it is not most of them, or where the recordings do not ask for the candidate.
+        0 where it is not most of them, or where the candidate is not significant.
         """
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
         share = self.of_free_run([])
         if self.lost or not self.free.gram[0, 0] > LARGE_ERROR**2 * noise * self.free.samples:
             return np.zeros_like(share)
-        return np.where((share > MAJORITY) & self._asked([], self.scan([])), share, 0.0)
+        return np.where((share > MAJORITY) & self._significant([], self.scan([])), share, 0.0)
 
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate is an alternative to `index` on top of `chosen`.

@@ -30,7 +30,7 @@ from ..vehicle import AbstractVehicle
 _PENALTY, _MARGIN = 30.0, 0.98
 # how nearly the mean over pairs is the smallest of them; a separation below which there is none
 _SHARP, _NONE = 4.0, 1e-6
-# a direction of the coefficients that nothing tells, relative to one that a column of unit length tells
+# information on a direction of the coefficients that nothing identifies, relative to a column of unit length
 _UNTOLD = 1e-10
 
 
@@ -58,7 +58,7 @@ class Rivals(eqx.Module):
     def of(
         cls, models: Sequence[AbstractVehicle], recorded: Runs, run: Runs, sigma: Array, bounds: Bounds, anchor: Array
     ) -> "Rivals":
-        """The rivals `models`, begun as `recorded` begins, on `run`."""
+        """The rivals `models` on `run`, from the initial states of `recorded`."""
         problems = [Problem.of(model, recorded, sigma) for model in models]
         return cls(
             tuple(models),

@@ -36,7 +36,7 @@ def estimates(fit: Fit, label: str, symbols: dict[str, str]) -> dict[str, Estima
 
 
 def trades(fit: Fit, label: str) -> dict[str, float]:
-    """The numbers that a fit hardly tells apart from those of one effect, with their correlation: of 0.9 and more.
+    """The parameters whose estimates are correlated with those of one effect by 0.9 and more.
 
     The strongest first; an effect's own among each other are its shape, and not listed.
     """

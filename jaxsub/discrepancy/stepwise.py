@@ -15,7 +15,7 @@ from .cross_validation import Comparison, compare
 from .examine import listed, weighed
 from .innovation_models import InnovationModels, selector_without, validated_in_simulation
 from .model import p_value
-from .name import Named, asked_still, named_on, refitted, standing
+from .name import Named, significant_beside, named_on, refitted, standing
 from .rivals import told_apart
 from .selector import Selector
 from .settings import (
@@ -136,7 +136,7 @@ class _Search:
                 break
         if not np.isfinite(scan.value[number]):
             return one, []
-        close = (scan.value > scan.value[number] - CLEAR_LOG_BAYES) & ~asked_still(selector, [], number, scan)
+        close = (scan.value > scan.value[number] - CLEAR_LOG_BAYES) & ~significant_beside(selector, [], number, scan)
         close[own] = False
         others: dict[str, AbstractEffect] = {}
         for i in (i for i in np.argsort(-scan.value) if close[i]):

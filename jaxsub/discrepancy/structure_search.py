@@ -175,4 +175,4 @@ def reconsidered(
 def _explained(base: Model, best: Model, found: Examination) -> float:
     """The share of a fit's gain in the sum of it and of what correlated innovations still explain."""
     gain = 2.0 * (evidence_of(best.view) - evidence_of(base.view))
-    return share_of(gain, found.memory.told if found.memory.correlated else 0.0)
+    return share_of(gain, found.memory.gain if found.memory.correlated else 0.0)

@@ -16,7 +16,7 @@ def summary(
     found: Explained | None,
     p_value: float,
 ) -> str:
-    """The verdict, what is `explained` and left of the test runs' error, and effects that describe without a name.
+    """The verdict, what is `explained` and left of the test runs' error, and surrogate effects.
 
     None of an answer on the way, before the test runs are looked at.
     """
@@ -60,7 +60,8 @@ def _verdict(
         return f"The model lacks {names}, which acts in {places}."
     if verdict == "ambiguous":
         rivals = sorted({rival.effect for one in physics for rival in one.rivals})
-        others = f", but these runs cannot tell it from {', '.join(rivals)}" if rivals else ", but not with certainty"
+        unlike = f", but these runs do not separate it from {', '.join(rivals)}"
+        others = unlike if rivals else ", but not with certainty"
         return f"Something is missing in {places}: {names}{others}."
     if not where:
         return "The recordings are not explained, and no missing effect is significant in any equation."

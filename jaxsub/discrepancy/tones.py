@@ -1,4 +1,4 @@
-"""At which frequencies a force stands out of what lies around them: where a wave may be."""
+"""Spectral peaks of the missing force: candidate frequencies of waves."""
 
 import numpy as np
 from jaxtyping import Bool, Float

@@ -1,4 +1,4 @@
-r"""Frequencies of waves, tuned to where a wave says most of what the recordings ask for.
+r"""Frequencies of waves, tuned to the largest evidence of a wave.
 
 A force shows a frequency to about a spectral line, and a wave many sigma large that is off by so little is out of step
 at both ends of a run. About the middle m of the runs it is close to $a\cos\omega t + b\sin\omega t +

@@ -1,4 +1,4 @@
-"""The white part of residuals, and how much of innovations their past tells beside effects."""
+"""The white part of residuals, and how much of the innovations is predicted by their past."""
 
 from typing import NamedTuple
 
@@ -16,12 +16,12 @@ class Memory(NamedTuple):
 
     - `p_value`: how probable they are to be so correlated over time by chance.
     - `explained`: the share that some effects have in what they explain and what the innovations' past would.
-    - `told`: how much χ² that past would explain.
+    - `gain`: the χ² that the past explains.
     """
 
     p_value: float
     explained: float
-    told: float = 0.0
+    gain: float = 0.0
 
     @property
     def correlated(self) -> bool:
@@ -34,13 +34,13 @@ RANDOM = Memory(1.0, 1.0)
 
 def memory(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r k c"], gain: float) -> Memory:
     """Of innovations that are left beside effects which `gain` so much χ²."""
-    told = remembered(white, measured)
-    return Memory(portmanteau(white, measured), share_of(gain, told), told)
+    past = remembered(white, measured)
+    return Memory(portmanteau(white, measured), share_of(gain, past), past)
 
 
-def share_of(gain: float, told: float) -> float:
-    """Of what effects `gain` and what is `told` beside them, both χ², the effects' share."""
-    return max(gain, 0.0) / max(gain + told, 1e-300)
+def share_of(gain: float, past: float) -> float:
+    """The effects' share of the χ² that they `gain` and that the `past` of the innovations explains."""
+    return max(gain, 0.0) / max(gain + past, 1e-300)
 
 
 def record_sigma(error: Float[np.ndarray, "r k c"], mask: np.ndarray) -> Float[np.ndarray, " c"]:

@@ -24,15 +24,15 @@ def test_what_acts_in_the_same_place_is_fitted_although_a_picture_finds_it_far_w
     """Claim: of two thirds of the χ² cubic damping in the same equation is a twin, in another it is none."""
     damping = {"named": QuadraticDamping("x", -0.5), "same": CubicDamping("x", -0.5), "other": CubicDamping("y", -0.5)}
     found = named_on(Scanned([600.0, 400.0, 400.0], **damping), [], 0)
-    assert found.twins == [1]
-    assert named_on(Scanned([600.0, 200.0, 590.0], **damping), [], 0).twins == [2]
+    assert found.collinear == [1]
+    assert named_on(Scanned([600.0, 200.0, 590.0], **damping), [], 0).collinear == [2]
 
 
 def test_the_same_effect_elsewhere_is_fitted_and_is_no_rival():
     """Claim: drag of nearly the same χ² in another equation is a twin and shares the name's probability."""
     here, there, cubic = QuadraticDamping("x", -0.5), QuadraticDamping("y", -0.5), CubicDamping("y", -0.5)
     found = named_on(Scanned([600.0, 595.0, 400.0], here=here, there=there, cubic=cubic), [], 0)
-    assert (found.twins, found.rivals, found.probability) == ([1], [], pytest.approx(1.0))
+    assert (found.collinear, found.rivals, found.probability) == ([1], [], pytest.approx(1.0))
     assert refitted(found, [(there, -10.0), (here, -11.0)]).probability == pytest.approx(1.0)
 
 
@@ -41,8 +41,8 @@ def test_what_does_as_much_and_is_asked_for_still_is_no_twin():
     beside the first, unless a free run asked for that."""
     effects = {"here": QuadraticDamping("x", -0.5), "there": CubicDamping("y", -0.5)}
     other = Scanned([600.0, 595.0], left=0.7, **effects)
-    assert (named_on(other, [], 0).twins, named_on(other, [], 0).rivals) == ([], [])
+    assert (named_on(other, [], 0).collinear, named_on(other, [], 0).rivals) == ([], [])
     assert named_on(Scanned([6.0, 5.9], left=0.7, **effects), [], 0).rivals != []
-    assert named_on(Scanned([600.0, 595.0], left=0.3, **effects), [], 0).twins == [1]
+    assert named_on(Scanned([600.0, 595.0], left=0.3, **effects), [], 0).collinear == [1]
     other.freely.add(0)
-    assert named_on(other, [], 0).twins == [1]
+    assert named_on(other, [], 0).collinear == [1]
