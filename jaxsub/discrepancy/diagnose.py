@@ -57,8 +57,8 @@ def diagnose(
 
     Nothing of the runs `test` takes part in a decision: the models are simulated along them once, at the end. Returns
     the diagnosis and the improved vehicle; `vocabulary` is all that is installed by default; `progress` receives what
-    is being done. After `budget` seconds, or once `stop()` is true, no further effect is tried, and the answer so far is
-    given, which then is not `complete`. Each answer on the way is given to `keep`: one more effect was accepted, and
+    is being done. After `budget` seconds, or once `stop()` is true, no further effect is tried, and the answer so far
+    is given, which then is not `complete`. Each answer on the way is given to `keep`: one more effect was accepted, and
     the test runs were not looked at yet. Effects to `begin` with, as of an earlier answer, come before any other, if
     they are accepted together. **Raises** `InputError` where the recordings lack a column, the model does not run from
     the vehicle file's values or diverges along the recordings, or `begin` has effects that are no candidates.

@@ -15,7 +15,7 @@ from .cross_validation import Comparison, compare
 from .examine import listed, weighed
 from .innovation_models import InnovationModels, selector_without, validated_in_simulation
 from .model import p_value
-from .name import Named, significant_beside, named_on, refitted, standing
+from .name import Named, named_on, refitted, significant_beside, standing
 from .rivals import told_apart
 from .selector import Selector
 from .settings import (
