@@ -275,7 +275,6 @@ def accept_proposed(
     selects effects that compensate each other's errors. Where none is accepted, those that were fitted by themselves
     are no candidates of `found` any more.
     """
-    freely = not found.selector.freely.isdisjoint(chosen)
     models, effects = CandidateModels(fitter.with_effects, base, found), found.selector.candidates
     kept = accept_singly(models, dominant(found.selector, chosen))
     if not kept and len(chosen) > 1:
@@ -287,8 +286,9 @@ def accept_proposed(
         # a fit has found the best shape of its effect: other shapes of it would end there too
         fallen = {effects[key[0]].label for key in models.by_numbers if len(key) == 1}
         found.selector.usable[[effect.label in fallen for effect in effects]] = False
-    # an alternative has the rivals of the effect that simulation selected
-    found.selector.freely.update(kept if freely else ())
+    # an alternative to what simulation selected has the rivals of that; no other is compared with what was not fitted
+    freely = found.selector.freely
+    freely.update([i for i, fits in kept.items() if not freely.isdisjoint(number for number, _ in fits)])
     return models.model([*kept]), settled(judged, with_posteriors(models, kept, refused))
 
 

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..arrays import Values
 from ..results import RESULTS
 from .damped import Damped, State
 from .method import Found, Iterative, Passes, from_start
@@ -28,7 +29,7 @@ def _nobody(done: float, expected: float) -> None:
 class Descent:
     """One damped Gauss–Newton search, a pass over all samples at a time."""
 
-    def __init__(self, method: "GaussNewton", problem: Problem, start: Float[Array, " d"]):
+    def __init__(self, method: "GaussNewton", problem: Problem, start: Float[Values, " d"]):
         self._solver, self._most, self.problem = method.solver, method.max_steps, problem
         self._y = self._trial = jax.device_put(np.asarray(start))
         self._state: State | None = None
@@ -83,7 +84,7 @@ class GaussNewton(Iterative):
         """As `Iterative.run`. `passes` is told of passes over all samples: how many are done and how many expected."""
         if len(starts) > 1 or outputs is not None or problem.march is not None:
             return super().run(problem, starts, outputs)
-        return raced([Descent(self, problem, starts[0])], passes or _nobody).found
+        return raced([Descent(self, problem, np.asarray(starts)[0])], passes or _nobody).found
 
 
 def raced(searches: Sequence[Descent], tell: Passes = _nobody) -> Descent:

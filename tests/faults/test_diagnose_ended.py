@@ -20,16 +20,16 @@ from jaxsub.vehicle import read_vehicle, write_vehicle
 PROGRAM = """
 import os, sys
 from jaxsub.cli import main
-from jaxsub.discrepancy import explain
+from jaxsub.discrepancy import structure_search
 from jaxsub.effects import mechanisms, hull_damping
 from jaxsub.cli import diagnose
 diagnose.vocabulary = lambda: (mechanisms.CoulombFriction, hull_damping.QuadraticDamping)
-whole = explain.examine
+whole = structure_search.examine
 def examine(*given):
     for number in {numbers}:
         os.kill(os.getpid(), number)
     return whole(*given)
-explain.examine = examine
+structure_search.examine = examine
 main()
 """
 
