@@ -8,14 +8,13 @@ likelihood.
 import dataclasses
 from collections.abc import Iterable, Iterator
 from functools import cached_property
-from typing import TypeVar
 
 import jax
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..arrays import quietly
-from ..estimate import Ended, Problem, estimate_disturbance
+from ..estimate import Problem, by_cost, estimate_disturbance
 from ..likelihood import Columns, Disturbance, Followed, follow
 from ..vehicle import AbstractVehicle
 from .settings import PRIOR_WIDTH
@@ -203,14 +202,6 @@ def with_wide_priors(problem: Problem) -> Problem:
     width, given = PRIOR_WIDTH * np.abs(problem.prior_mean), [row.name in own for row in vehicle.layout.free]
     wide = np.array(given, bool) & (width > 0.0) & np.isinf(problem.prior_std)
     return dataclasses.replace(problem, prior_std=jax.device_put(np.where(wide, width, problem.prior_std)))
-
-
-Costed = TypeVar("Costed", Ended, Iterate)
-
-
-def by_cost(found: Iterable[Costed]) -> list[Costed]:
-    """Those of the least `cost` first, and what has no finite one last."""
-    return sorted(found, key=lambda one: float(one.cost) if np.isfinite(float(one.cost)) else np.inf)
 
 
 def distinct(found: Iterable[Iterate]) -> list[Iterate]:

@@ -8,10 +8,9 @@ import numpy as np
 from scipy import special
 
 from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, numbers, with_numbers
-from ..estimate import Ended, Fit, evaluate, race, search
+from ..estimate import Ended, Fit, by_cost, evaluate, race, search
 from ..identifiability import coloured_covariance
 from ..vehicle import AbstractVehicle
-from .innovation_search import by_cost
 from .settings import NEGLIGIBLE, SIGNIFICANCE
 from .view import View
 

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, Int
 
 from ..arrays import quietly
 from ..effects import Facts, Motion, wave_band
-from ..estimate import Fit, Problem
+from ..estimate import Fit, Problem, by_cost
 from ..likelihood import (
     Columns,
     Disturbance,
@@ -24,7 +24,7 @@ from ..likelihood import (
 )
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
-from .innovation_search import InnovationSearch, Iterate, by_cost, distinct, with_wide_priors
+from .innovation_search import InnovationSearch, Iterate, distinct, with_wide_priors
 from .settings import BLOCKS, LARGE_ERROR
 from .tones import tones
 from .whiteness import record_sigma

@@ -7,7 +7,7 @@ from .ends import Ends, ends
 from .filtered import Filtered
 from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, race, search
 from .initial_states import initial_guess, rest, state_channels
-from .method import AbstractMethod, Found, Iterative, Passes, share_for, shares_at_once
+from .method import AbstractMethod, Found, Iterative, Passes, by_cost, share_for, shares_at_once
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .posterior import posterior
 from .problem import Expansion, Problem, require_free
@@ -36,6 +36,7 @@ __all__ = [
     "assess",
     "assess_residuals",
     "basins",
+    "by_cost",
     "channel_rms",
     "ekf",
     "ends",

@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float
 from ..arrays import Values
 from ..results import RESULTS
 from .damped import Damped, State
-from .method import Found, Iterative, Passes, from_start
+from .method import Found, Iterative, Passes, by_cost, from_start, unwatched
 from .pool import ending
 from .problem import Problem
 
@@ -20,10 +20,6 @@ from .problem import Problem
 _ROUND = 12
 # passes that a search takes as a rule, and by how much each brings it nearer at least, before it has shown itself
 _USUAL, _SLOWEST = 6, 0.7
-
-
-def _nobody(done: float, expected: float) -> None:
-    """Who is not told of passes."""
 
 
 class Descent:
@@ -84,10 +80,10 @@ class GaussNewton(Iterative):
         """As `Iterative.run`. `passes` is told of passes over all samples: how many are done and how many expected."""
         if len(starts) > 1 or outputs is not None or problem.march is not None:
             return super().run(problem, starts, outputs)
-        return raced([Descent(self, problem, np.asarray(starts)[0])], passes or _nobody).found
+        return raced([Descent(self, problem, np.asarray(starts)[0])], passes or unwatched).found
 
 
-def raced(searches: Sequence[Descent], tell: Passes = _nobody) -> Descent:
+def raced(searches: Sequence[Descent], tell: Passes = unwatched) -> Descent:
     """Some searches, all begun anew: the one that is best at its end.
 
     All take some passes and the better half goes on, until one is left.
@@ -98,8 +94,7 @@ def raced(searches: Sequence[Descent], tell: Passes = _nobody) -> Descent:
                 search.advance(tell)
         if len(searches) == 1:
             break
-        by_cost = sorted(searches, key=lambda search: search.cost if np.isfinite(search.cost) else np.inf)
-        searches = by_cost[: len(searches) // 2]
+        searches = by_cost(searches)[: len(searches) // 2]
     return searches[0]
 
 

@@ -17,7 +17,7 @@ from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .blockwise import Descent, raced
 from .curvature import alone
-from .method import AbstractMethod, Passes
+from .method import AbstractMethod, Passes, unwatched
 from .methods import filtered_first, gauss_newton
 from .problem import Problem
 
@@ -210,7 +210,7 @@ def _fitted(
     known_start: bool,
     passes: Passes | None,
 ) -> Fit:
-    tell = passes or (lambda done, expected: None)
+    tell = passes or unwatched
     # one pass more, for the statistics
     told = lambda done, expected: tell(done, expected + 1.0)
     ended = search(vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start, passes=told)

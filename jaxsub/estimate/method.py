@@ -3,9 +3,9 @@
 import abc
 import dataclasses
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import equinox as eqx
 import jax
@@ -31,6 +31,27 @@ _TURNS = 16
 
 # told the passes over all samples that are done, and how many are expected
 Passes = Callable[[float, float], object]
+
+
+def unwatched(done: float, expected: float) -> None:
+    """Passes that nobody is told of."""
+
+
+@runtime_checkable
+class Costed(Protocol):
+    """What has a `cost`."""
+
+    @property
+    def cost(self) -> Any:
+        """Minus a log likelihood."""
+
+
+C = TypeVar("C", bound=Costed)
+
+
+def by_cost(found: Iterable[C]) -> list[C]:
+    """Those of the least `cost` first, and what has no finite one last."""
+    return sorted(found, key=lambda one: float(one.cost) if np.isfinite(float(one.cost)) else np.inf)
 
 
 class Found(eqx.Module):
