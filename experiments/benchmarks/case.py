@@ -9,8 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsub.cli.demo import inputs
-from jaxsub.discrepancy import batch
-from jaxsub.estimate import Problem
+from jaxsub.estimate import Problem, batch
 from jaxsub.recording import Recording
 from jaxsub.simulate import at_rest, sampled_states, synthetic
 from jaxsub.vehicle import AbstractVehicle

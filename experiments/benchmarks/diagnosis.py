@@ -13,7 +13,6 @@ import jax
 import numpy as np
 
 from jaxsub.cli import main as command_line
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.columns import candidate_columns
 from jaxsub.discrepancy.evidence import Evidence
 from jaxsub.discrepancy.view import View, facts, look
@@ -27,7 +26,7 @@ from .timing import once, spread_of, timed
 def score_pass(out: Path, quick: bool) -> dict:
     """A Gauss-Newton step and score passes over 100 and 200 candidates, first calls apart; refits of a few of them."""
     vehicle, recordings = recordings_and_vehicle()
-    found = fit(vehicle, batch(vehicle, recordings))
+    found = fit(vehicle, recordings)
     view = look(found)
     listed = candidates(facts(view))
     first = {}

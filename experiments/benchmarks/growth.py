@@ -11,7 +11,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.view import facts, look
 from jaxsub.effects import candidates
 from jaxsub.estimate import Problem, fit
@@ -83,7 +82,7 @@ def _step(free: int):
 
 def _candidates(sizes: tuple[int, ...], quick: bool) -> dict:
     vehicle, recordings = recordings_and_vehicle()
-    view = look(fit(vehicle, batch(vehicle, recordings)))
+    view = look(fit(vehicle, recordings))
     listed = candidates(facts(view))
     # in the vocabulary's order the first would be forces, and the dearer actuators and sensors the last
     order = np.random.default_rng(3).permutation(len(listed))

@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxsub.cli.demo import make_files
 from jaxsub.control import Mpc, Pursuit, discretise, pursue
-from jaxsub.discrepancy import batch, diagnose
+from jaxsub.discrepancy import diagnose
 from jaxsub.effects import AbstractEffect, ActuatorLag, HullAsymmetry
 from jaxsub.estimate import fit
 from jaxsub.parameters import number
@@ -46,7 +46,7 @@ def flights(name: str, out: Path, quick: bool) -> dict:
         diagnosis, found = diagnose(vehicle, runs[:-1], runs[-1:])
         write_vehicle(found, folder / "improved.toml", "improved by a diagnosis")
         improved = read_vehicle(folder / "improved.toml")
-    baseline = fit(vehicle, batch(vehicle, runs[:-1])).vehicle
+    baseline = fit(vehicle, runs[:-1]).vehicle
     models = {"baseline": baseline, "improved": improved, "truth": truth}
     seeds = range(1, 2 if quick else 6)
     wanted = references(40.0 if quick else SECONDS)

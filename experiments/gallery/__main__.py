@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsub.cli import session, terminal
-from jaxsub.discrepancy import batch
 from jaxsub.effects import VOCABULARY, AbstractEffect, amplitudes, candidates, numbers, with_numbers
+from jaxsub.estimate import batch
 from jaxsub.recording import Recording
 from jaxsub.simulate import simulate
 from jaxsub.vehicle import AbstractVehicle

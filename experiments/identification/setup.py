@@ -7,8 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsub.control import scenario_one, scenario_two
-from jaxsub.discrepancy import batch
-from jaxsub.estimate import Ended, Fit, Found, Problem, evaluate
+from jaxsub.estimate import Ended, Fit, Found, Problem, batch, evaluate
 from jaxsub.recording import Recording
 from jaxsub.simulate import at_rest
 from jaxsub.vehicle import AbstractVehicle

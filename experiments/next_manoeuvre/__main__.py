@@ -14,9 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments.parts import main
-from jaxsub.discrepancy import batch, diagnose
+from jaxsub.discrepancy import diagnose
 from jaxsub.discrepancy.manoeuvre import Manoeuvre, recorded_limits, separating_manoeuvre
-from jaxsub.estimate import search
+from jaxsub.estimate import batch, search
 from jaxsub.identifiability.design_limits import Bounds, Limits
 from jaxsub.identifiability.design_search import telegraphs
 from jaxsub.recording import Recording

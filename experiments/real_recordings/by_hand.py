@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Array
 
-from jaxsub.discrepancy import batch
-from jaxsub.estimate import fit, search
+from jaxsub.estimate import batch, fit, search
 from jaxsub.likelihood import output_errors
 from jaxsub.recording import Recording
 from jaxsub.vehicle import AbstractVehicle, read_vehicle, vehicle_text
@@ -24,7 +23,7 @@ def by_hand(case: Case, folder: Path) -> dict:
     for label, text in (("baseline", case.vehicle), ("picked", case.vehicle + case.picked)):
         file.write_text(text, encoding="utf-8")
         vehicle = read_vehicle(file)
-        fitted = fit(vehicle, batch(vehicle, case.train))
+        fitted = fit(vehicle, case.train)
         file.write_text(vehicle_text(fitted.vehicle, f"{vehicle.layout.name}, physics picked by hand"), "utf-8")
         errors = free_run_errors(fitted.vehicle, case.held, fitted.sigma)
         each = np.sqrt(np.mean(np.concatenate(errors) ** 2, axis=0)).tolist()

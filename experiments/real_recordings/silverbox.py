@@ -10,8 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from jaxsub.discrepancy import batch
-from jaxsub.estimate import search
+from jaxsub.estimate import batch, search
 from jaxsub.recording import Recording
 from jaxsub.simulate import simulate
 from jaxsub.vehicle import AbstractVehicle, read_vehicle

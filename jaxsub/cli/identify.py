@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..discrepancy import batch
 from ..errors import InputError, OutputError
-from ..estimate import METHODS, Fit, Passes, assess, fit, posterior, require_free
+from ..estimate import METHODS, Fit, Passes, assess, batch, fit, posterior, require_free
 from ..identifiability import coloured_covariance, identifiability
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle, read_vehicle

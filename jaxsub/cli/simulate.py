@@ -8,9 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..discrepancy import batch
 from ..errors import InputError
-from ..estimate import Assessment, assess_residuals, channel_rms, initial_guess, rest, search, state_channels
+from ..estimate import Assessment, assess_residuals, batch, channel_rms, initial_guess, rest, search, state_channels
 from ..findings import Finding
 from ..likelihood import residual_outputs
 from ..recording import Recording, save

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import AbstractEffect
-from ..estimate import Ended, Fit
+from ..estimate import Ended, Fit, substeps_for, substeps_unseen
 from ..likelihood import Disturbance
 from ..vehicle import AbstractVehicle
 from .cross_validation import Comparison, Predicted, compare, one_step_ahead, simulated
@@ -20,7 +20,6 @@ from .progress import Progress
 from .rivals import told_apart
 from .selector import Selector
 from .settings import DOMINANT_SHARE, FORCE_RATIO, SIGNIFICANCE
-from .stiffness import substeps_for, substeps_unseen
 from .verdict import Judged, helped, settled
 from .view import View, look
 from .whiteness import Memory

@@ -24,8 +24,9 @@ from ..effects import (
     with_numbers,
 )
 from ..likelihood import Columns
+from ..simulate import Trajectory
 from ..vehicle import AbstractVehicle
-from .view import Trajectory, View
+from .view import View
 
 # by how much a shape such as a lag is moved to see which way the data would have it
 _NUDGE = 0.1

@@ -8,14 +8,13 @@ import numpy as np
 
 from ..effects import FORCE_UNITS, AbstractEffect
 from ..errors import InputError
-from ..estimate import Fit, fit
+from ..estimate import Fit, batch, fit
 from ..findings import Finding
 from ..recording import Recording
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle, vehicle_findings
 from .acceptance import Examination, Model, ModelFitter, fitted_model
 from .advice import next_manoeuvre
-from .batch import batch
 from .consistency import consistent
 from .diagnosis import Candidate, Diagnosis, Location, Physics, Rival
 from .evaluation import overlays

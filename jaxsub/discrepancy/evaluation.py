@@ -6,14 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import channel_rms, initial_guess, search
+from ..estimate import batch, channel_rms, initial_guess, search
 from ..likelihood import follow, residual_outputs
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle
 from .acceptance import Model
-from .batch import batch
 from .cross_validation import gain
 from .diagnosis import Gain, Overlay
 from .restarts import restarted

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..effects import AbstractEffect
-from ..estimate import Ended, evaluate, initial_guess
+from ..estimate import Ended, evaluate, initial_guess, substeps_for
 from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import SUCCESSFUL
 from ..vehicle import AbstractVehicle
@@ -25,7 +25,6 @@ from .programs import make_room
 from .restarts import restarted, starts
 from .selector import Selector
 from .settings import BLOCKS, FEWEST_SAMPLES, MOST_RESTARTS, RESTART_ERROR
-from .stiffness import substeps_for
 from .view import View, led_from, look
 
 

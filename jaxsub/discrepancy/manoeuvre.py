@@ -16,14 +16,13 @@ from jaxtyping import Array, Float
 
 from ..effects import CHANNEL_UNITS
 from ..errors import InputError
-from ..estimate import Problem
+from ..estimate import Problem, batch
 from ..identifiability.design_limits import Bounds, Limits, Range
 from ..identifiability.design_search import descend, telegraphs
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulate import sampled_states
 from ..vehicle import AbstractVehicle
-from .batch import batch
 from .separation import Rivals, loss
 
 # of the recorded range of a channel, how far a manoeuvre may leave it on either side; and at least how far

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import jax.numpy as jnp
 
-from ..estimate import search
+from ..estimate import batch, search
 from ..recording import Recording
-from .batch import batch
 from .diagnosis import Diagnosis
 from .manoeuvre import Manoeuvre, separating_manoeuvre
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..arrays import quietly
-from ..effects import Facts, Motion, wave_band
+from ..effects import Facts, wave_band
 from ..estimate import Fit, Problem, by_cost
 from ..likelihood import (
     Columns,
@@ -23,6 +23,7 @@ from ..likelihood import (
     smoothed,
 )
 from ..recording.runs import Runs
+from ..simulate import Trajectory
 from ..vehicle import AbstractVehicle
 from .innovation_search import InnovationSearch, Iterate, distinct, with_wide_priors
 from .settings import BLOCKS, LARGE_ERROR
@@ -34,44 +35,6 @@ _DOUBTED = 3
 # of the disturbance that would explain all of the misfit: a start that the search can grow from
 _QUIET = 1e-2
 _LEAST_WHITE = 1e-5
-
-
-class Trajectory(eqx.Module):
-    """The filtered trajectory as NumPy arrays: what effects are evaluated on.
-
-    NumPy on purpose: a force is a handful of array operations, so a vocabulary of any size costs no compilation.
-
-    **Fields**
-
-    - `start`, `end`: at both ends of every interval, (R, K-1): filtered, and what was expected from there.
-    - `seen`: at every sample, (R, K), as expected; `true`: (R, K) measured channels there, before any sensor effect.
-    - `nodes`: (R, K-1, 3, m) signals after the actuators, time last. `times`: (R, K) s; `steps`: (R, K-1) s, 0 where
-      padded.
-    """
-
-    start: Motion
-    end: Motion
-    seen: Motion
-    true: dict[str, np.ndarray]
-    nodes: np.ndarray
-    times: np.ndarray
-    steps: np.ndarray
-
-    @classmethod
-    def of(cls, vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered: Array) -> "Trajectory":
-        """Along states (R, K, s) expected and filtered."""
-        found = _trajectory(vehicle, runs, expected, filtered)
-        steps = np.where(runs.live, np.asarray(runs.steps)[np.asarray(runs.step_of)], 0.0)
-        return cls(*(jax.tree.map(np.asarray, part) for part in (*found, runs.times, steps)))
-
-
-@eqx.filter_jit
-def _trajectory(vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered: Array) -> tuple:
-    nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
-    start = vehicle.motion(filtered[:, :-1], nodes[:, :, 0])
-    end = vehicle.motion(expected[:, 1:], nodes[:, :, 2])
-    true, seen = vehicle.truth(runs.times, expected, runs.signals)
-    return start, end, seen, true, nodes
 
 
 @dataclasses.dataclass(frozen=True)

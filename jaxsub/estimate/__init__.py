@@ -1,12 +1,14 @@
 """Estimation: one `fit`, one `Fit`, and the methods that may do it."""
 
 from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_residuals
+from .batches import batch
 from .combined import Chain, Global
 from .disturbance import estimate_disturbance
 from .ends import Ends, ends
 from .filtered import Filtered
 from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, race, search
 from .initial_states import initial_guess, rest, state_channels
+from .integration_steps import substeps_for, substeps_unseen
 from .method import AbstractMethod, Found, Iterative, Passes, by_cost, share_for, shares_at_once
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .posterior import posterior
@@ -36,6 +38,7 @@ __all__ = [
     "assess",
     "assess_residuals",
     "basins",
+    "batch",
     "by_cost",
     "channel_rms",
     "ekf",
@@ -61,5 +64,7 @@ __all__ = [
     "share_for",
     "shares_at_once",
     "state_channels",
+    "substeps_for",
+    "substeps_unseen",
     "success",
 ]

@@ -12,9 +12,11 @@ from jaxtyping import Array, Bool, Float
 from ..arrays import Values, quietly
 from ..filter.vehicle import unfilterable
 from ..likelihood import BlockLinearised, Watch, concentrated_sigma, nobody, output_errors
+from ..recording import Recording
 from ..recording.runs import Runs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
+from .batches import batch
 from .blockwise import Descent, raced
 from .curvature import alone
 from .method import AbstractMethod, Passes, unwatched
@@ -178,7 +180,7 @@ def _signal(runs: Runs) -> Array:
 
 def fit(
     vehicle: AbstractVehicle,
-    runs: Runs,
+    recordings: Sequence[Recording] | Runs,
     *,
     method: AbstractMethod | None = None,
     sigma: Array | None = None,
@@ -186,7 +188,7 @@ def fit(
     known_start: bool = False,
     passes: Passes | None = None,
 ) -> Fit:
-    """Fit the free numbers of `vehicle`, and an initial state for each run, to `runs`.
+    """Fit the free numbers of `vehicle`, and an initial state for each run, to `recordings` or the `batch` of them.
 
     `method` is Gauss–Newton where none is given; where that does not run or arrive, also from the end of a filter, and
     the more probable is taken. The simulation of an unstable model diverges, while a filter follows the
@@ -194,6 +196,7 @@ def fit(
     where the initial states' search begins, or with `known_start` what they are. A failure is a value in `Fit.result`,
     no exception. `passes` is told how many passes over long runs are done and expected (`AbstractMethod.run`).
     """
+    runs = recordings if isinstance(recordings, Runs) else batch(vehicle, recordings)
     by = lambda method: _fitted(vehicle, runs, method, sigma, start, known_start, passes)
     found = by(method)
     if method is None and not bool(found.result == RESULTS.successful) and not unfilterable(vehicle):

@@ -5,9 +5,11 @@ from .exponential import phi_functions, step_table
 from .manoeuvres import doublet, prbs, square, three_two_one_one
 from .sampled import Sampled, measure, sampled_states, simulate
 from .synthetic import at_rest, synthetic
+from .trajectory import Trajectory
 
 __all__ = [
     "Sampled",
+    "Trajectory",
     "at_rest",
     "doublet",
     "integrate",

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..discrepancy.batch import batch
 from ..errors import InputError
-from ..estimate import search
+from ..estimate import batch, search
 from ..recording import Recording
 from ..simulate import simulate
 from ..vehicle import AbstractVehicle

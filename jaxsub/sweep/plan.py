@@ -14,9 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..discrepancy.batch import batch
 from ..errors import InputError
-from ..estimate import METHODS, Problem, scattered_by_number, search, share_for
+from ..estimate import METHODS, Problem, batch, scattered_by_number, search, share_for
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
 

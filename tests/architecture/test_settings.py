@@ -31,7 +31,6 @@ ALLOWED = {
         "columns.py": {"_NUDGE"}, "spline_basis.py": {"_CHOOSING"}, "multiplicity.py": {"_DRAWS", "_SEED"},
         "process_noise.py": {"_SEED"}, "regime.py": {"_SHIFTS"},
         "smoothness.py": {"FINE", "_SIZES"}, "tones.py": {"_LINES"}, "validation.py": {"_DELAYS"},
-        "stiffness.py": {"FINEST", "_TOO_MUCH", "_FOLLOWED", "_UNSEEN", "_SMALL"},
     },
     "designs the next manoeuvre, after the verdict": {
         "manoeuvre.py": {"_WIDER", "_LEAST", "_PARTS"}, "next_run.py": {"_LONGEST"},

@@ -10,8 +10,7 @@ from commands import ran
 from rigs import driven, oscillator
 from scipy.integrate import solve_ivp
 
-from jaxsub.discrepancy import batch
-from jaxsub.estimate import channel_rms, fit, search
+from jaxsub.estimate import batch, channel_rms, fit, search
 from jaxsub.likelihood import output_errors
 from jaxsub.recording import load, save
 from jaxsub.simulate import synthetic

@@ -13,7 +13,7 @@ from experiments.concealed_physics.generate import generate
 from experiments.concealed_physics.plan import cases
 from experiments.next_manoeuvre.cases import case
 from jaxsub.cli.runs import load_runs
-from jaxsub.discrepancy import batch, diagnose
+from jaxsub.discrepancy import diagnose
 from jaxsub.discrepancy.acceptance import (
     CandidateModels,
     Examination,
@@ -36,7 +36,7 @@ from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.mechanisms import CoulombFriction
 from jaxsub.effects.sensors import SensorScale
-from jaxsub.estimate import Ended, Problem, evaluate, fit
+from jaxsub.estimate import Ended, Problem, batch, evaluate, fit
 from jaxsub.results import RESULTS
 from jaxsub.vehicle import read_vehicle
 from jaxsub.vehicle.catalogue import dsrv

@@ -9,11 +9,10 @@ import pytest
 from rigs import driven, oscillator
 from scipy import stats
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.cross_validation import Comparison, Gain, Predicted, compare, gain, one_step_ahead, simulated
 from jaxsub.discrepancy.verdict import NOTHING, helped
 from jaxsub.discrepancy.view import look
-from jaxsub.estimate import fit
+from jaxsub.estimate import batch, fit
 from jaxsub.likelihood import BlockLinearised, whitened
 from jaxsub.simulate import synthetic
 

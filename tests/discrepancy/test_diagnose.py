@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import INTERVAL, SAMPLES, disturbed, recorded, wrong
 
-from jaxsub.discrepancy import batch, diagnose
+from jaxsub.discrepancy import diagnose
 from jaxsub.discrepancy.locate import traces
 from jaxsub.discrepancy.next_run import next_run
 from jaxsub.discrepancy.view import look
@@ -164,7 +164,7 @@ def test_the_located_force_is_the_one_that_acts():
     runs = recorded(effect, 5)[:2]
     rows = tuple(dataclasses.replace(row, free=False) for row in dsrv().layout.parameters)
     known = dataclasses.replace(dsrv(), layout=dataclasses.replace(dsrv().layout, parameters=rows))
-    found = fit(known, batch(known, runs))
+    found = fit(known, runs)
     view = look(found)
     assert int(jnp.argmax(view.disturbance.force / jnp.array([100.0, 100.0]))) == 0
     for trace, recording in zip(traces(view, runs), runs, strict=True):

@@ -10,7 +10,6 @@ from diagnosis_cases import INTERVAL, recorded, wrong
 from jax import Array
 from scipy import stats
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.columns import candidate_columns, plausible, sensor_changes
 from jaxsub.discrepancy.evidence import Evidence, Products, evidence_of
 from jaxsub.discrepancy.locate import effect_shares
@@ -22,7 +21,7 @@ from jaxsub.effects import AbstractInstrument, FluidMemory, amplitude, candidate
 from jaxsub.effects.hull import CrossflowDrag
 from jaxsub.effects.sensor_mounting import SensorLeverArm
 from jaxsub.effects.sensors import SensorScale
-from jaxsub.estimate import fit
+from jaxsub.estimate import batch, fit
 from jaxsub.likelihood import Disturbance, whitened
 
 
@@ -130,7 +129,7 @@ def test_wrong_scale_of_the_noise_raises_no_alarm():
     quiet = wrong()
     rows = tuple(dataclasses.replace(o, sigma=0.5 * (o.sigma or 1.0)) for o in quiet.layout.outputs)
     quiet = dataclasses.replace(quiet, layout=dataclasses.replace(quiet.layout, outputs=rows))
-    view = look(fit(quiet, batch(quiet, recorded(None, 1)[:2])))
+    view = look(fit(quiet, recorded(None, 1)[:2]))
     np.testing.assert_allclose(view.disturbance.noise, 2.0, rtol=0.15)
     tried = candidates(facts(view))
     columns, owners = candidate_columns(view, tried)

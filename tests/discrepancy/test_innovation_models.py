@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 from rigs import oscillator
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.acceptance import Model, ModelFitter
 from jaxsub.discrepancy.cross_validation import Predicted, one_step_ahead
 from jaxsub.discrepancy.evaluation import evaluated
@@ -23,7 +22,7 @@ from jaxsub.discrepancy.view import led_from
 from jaxsub.effects import CubicStiffness, numbers
 from jaxsub.effects.actuator_curves import ActuatorDeadband
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
-from jaxsub.estimate import Ended, Problem, initial_guess
+from jaxsub.estimate import Ended, Problem, batch, initial_guess
 from jaxsub.likelihood import Disturbance, whitened
 from jaxsub.recording import Recording
 from jaxsub.results import RESULTS

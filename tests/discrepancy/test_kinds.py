@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from diagnosis_cases import disturbed, recorded, wrong
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.acceptance import Examination
 from jaxsub.discrepancy.examine import examine, listed
 from jaxsub.discrepancy.kinds import leading, missing, right
@@ -14,7 +13,7 @@ from jaxsub.discrepancy.model import fit_with
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import ActuatorLag, CrossflowDrag, Current, SensorScale
-from jaxsub.estimate import fit
+from jaxsub.estimate import batch, fit
 from jaxsub.vehicle.catalogue import dsrv
 
 KINDS = (CrossflowDrag, ActuatorLag, Current, SensorScale)

@@ -9,11 +9,11 @@ import pytest
 from diagnosis_cases import recorded, wrong
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy import batch, innovation_search, view
+from jaxsub.discrepancy import innovation_search, view
 from jaxsub.discrepancy.evidence import evidence_of
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
-from jaxsub.estimate import fit
+from jaxsub.estimate import batch, fit
 from jaxsub.simulate import synthetic
 
 
@@ -89,7 +89,7 @@ def test_numbers_that_the_recordings_do_not_tell_are_of_the_order_of_the_files()
     start = jnp.asarray([[0.5, 0.0]])
     for given, spread in ((2.0, 20.0), ({"value": 2.0, "prior_std": 0.3}, 0.3)):
         vehicle = oscillator(coefficients={"D_x": 0.6, "K_x": 4.0, "B_x_drive": given})
-        led = look(fit(vehicle, batch(vehicle, synthetic(vehicle, [still], seed=3, start=start))))
+        led = look(fit(vehicle, synthetic(vehicle, [still], seed=3, start=start)))
         at = [row.name for row in vehicle.layout.free].index("B_x_drive")
         assert float(led.vehicle.values()["B_x_drive"]) == pytest.approx(2.0)
         assert np.sqrt(led.covariance[at, at]) == pytest.approx(spread, rel=1e-3)

@@ -8,12 +8,11 @@ import pytest
 from rigs import oscillator
 
 from jaxsub.cli import simulate as simulate_command
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.manoeuvre import recorded_limits, separating_manoeuvre
 from jaxsub.discrepancy.separation import Rivals, loss
 from jaxsub.effects import VOCABULARY, with_numbers
 from jaxsub.errors import InputError
-from jaxsub.estimate import search
+from jaxsub.estimate import batch, search
 from jaxsub.identifiability.design_limits import Bounds, Limits
 from jaxsub.identifiability.design_search import descend
 from jaxsub.recording import Recording, load, save

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from diagnosis_cases import INTERVAL, SAMPLES
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.locate import Field, locations, traces
 from jaxsub.discrepancy.process_noise import NoiseSignal, calibrated, noise_note, noise_signals
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import ActuatorLag
-from jaxsub.estimate import fit
+from jaxsub.estimate import batch, fit
 from jaxsub.recording import Recording
 from jaxsub.simulate import Sampled, at_rest, prbs
 from jaxsub.simulate.sampled import measure
@@ -55,7 +54,7 @@ def recorded(equation, seed):
 
 def fitted(runs):
     vehicle = known()
-    return fit(vehicle, batch(vehicle, runs))
+    return fit(vehicle, runs)
 
 
 @pytest.mark.parametrize("equation", EQUATIONS)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from diagnosis_cases import recorded, wrong
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
 from jaxsub.discrepancy.model import fit_with
@@ -22,7 +21,7 @@ from jaxsub.effects import SmoothForce
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.sensors import SensorScale
-from jaxsub.estimate import fit
+from jaxsub.estimate import batch, fit
 
 NO_GAIN = Gain(0.0, 1.0, 1.0)
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from diagnosis_cases import INTERVAL, SAMPLES, recorded, wrong
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.tuned import tuned
 from jaxsub.discrepancy.view import facts, look
 from jaxsub.effects.environment import WaveForcing
-from jaxsub.estimate import fit
+from jaxsub.estimate import batch, fit
 
 OMEGA = 1.3
 LINE = 2.0 * np.pi / (SAMPLES * INTERVAL)

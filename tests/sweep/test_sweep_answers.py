@@ -13,9 +13,8 @@ from commands import environment
 from scipy.optimize import least_squares
 from sweep_cases import farthest, plan, recordings, vehicle
 
-from jaxsub.discrepancy import batch
 from jaxsub.errors import InputError
-from jaxsub.estimate import fit
+from jaxsub.estimate import batch, fit
 from jaxsub.sweep import OUTCOMES, answered, open_sweep, summarised, sweep
 
 TWO_DEVICES = "--xla_force_host_platform_device_count=2"

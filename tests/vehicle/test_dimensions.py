@@ -5,9 +5,9 @@ import pandas
 import pytest
 from rigs import oscillator
 
-from jaxsub.discrepancy import batch
 from jaxsub.effects import CHANNEL_UNITS
 from jaxsub.errors import InputError
+from jaxsub.estimate import batch
 from jaxsub.recording import Recording, from_pandas
 from jaxsub.units import si_unit, unit_rate
 from jaxsub.vehicle import check_units, vehicle_from

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy import batch
 from jaxsub.discrepancy.acceptance import ModelFitter, fitted_model
-from jaxsub.discrepancy.stiffness import FINEST, fastest, substeps_for, substeps_unseen
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import CubicStiffness, QuadraticDamping
 from jaxsub.effects.memory import Hysteresis
-from jaxsub.estimate import evaluate, fit, gauss_newton, initial_guess
+from jaxsub.estimate import batch, evaluate, fit, gauss_newton, initial_guess
+from jaxsub.estimate.integration_steps import FINEST, fastest, substeps_for, substeps_unseen
 from jaxsub.simulate import simulate, synthetic
 from jaxsub.simulate.synthetic import integrate
 from jaxsub.vehicle import vehicle_from, with_coefficients
@@ -24,7 +23,7 @@ from jaxsub.vehicle import vehicle_from, with_coefficients
 def fitted():
     vehicle = oscillator()
     runs = synthetic(vehicle, [driven(vehicle, 0.1 * np.arange(200), seed, amplitude=1.0) for seed in range(2)], seed=1)
-    return fit(vehicle, batch(vehicle, runs))
+    return fit(vehicle, runs)
 
 
 def test_the_fastest_rate_is_that_of_the_steepest_sample(fitted):

@@ -9,7 +9,7 @@ import numpy as np
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
 from ..vehicle import AbstractVehicle, check_units
-from .stiffness import substeps_free, substeps_of
+from .integration_steps import substeps_free, substeps_of
 
 
 def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:

@@ -17,12 +17,11 @@ import numpy as np
 from jaxtyping import Array
 
 from ..effects import AbstractForce, AbstractMemory, Motion
-from ..estimate import initial_guess
 from ..likelihood import concentrated_sigma
 from ..recording.runs import Runs
-from ..simulate import sampled_states, simulate
+from ..simulate import Trajectory, sampled_states, simulate
 from ..vehicle import AbstractVehicle
-from .view import Trajectory
+from .initial_states import initial_guess
 
 FINEST = 16  # steps in a sample interval
 # of a step times the fastest rate: beyond the one it is not followed, and with the other it is
