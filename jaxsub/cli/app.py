@@ -8,11 +8,13 @@ import click
 
 from . import process
 from .options import common
+from .quantity import dimensions
 
 _PATH = process.Location()
 # said here and not asked of `estimate`, so that `--help` needs no jax; a test holds the two together
 METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
 STARTS = ("rest", "recorded", "estimated")
+KINDS = ("auv",)
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
 _columns = click.option("--columns", type=_PATH, help="A TOML file that says which channels of a log to take.")
@@ -141,6 +143,21 @@ def simulate(vehicle: Path, run: Path, out: Path, start: Any, columns: Path | No
     from . import simulate as command
 
     command.run(vehicle, run, out, overwrite, columns, start)
+
+
+@app.command()
+@click.argument("kind", type=click.Choice(KINDS))
+@dimensions
+@click.option("--log", type=_PATH, help="A recording whose columns are the inputs and outputs.")
+@_columns
+@_out()
+@_overwrite
+@common
+def init(kind: str, log: Path | None, columns: Path | None, out: Path | None, overwrite: bool, **sizes: Any) -> None:
+    """Begin a vehicle file: coefficients estimated from dimensions, with their uncertainty and source."""
+    from . import init as command
+
+    command.run(kind, {name: size for name, size in sizes.items() if size is not None}, log, columns, out, overwrite)
 
 
 @app.command()

@@ -5,6 +5,7 @@ from .base import AbstractVehicle, Layout, Output
 from .build import build
 from .checks import require_inertia
 from .dimensions import check_units
+from .initial import InitialFile, initial_file
 from .mechanism import Mechanism
 from .oddities import vehicle_findings
 from .read import read_vehicle, vehicle_from
@@ -13,6 +14,7 @@ from .write import vehicle_text, write_vehicle
 
 __all__ = [
     "AbstractVehicle",
+    "InitialFile",
     "Layout",
     "Mechanism",
     "Output",
@@ -20,6 +22,7 @@ __all__ = [
     "added_effects",
     "build",
     "check_units",
+    "initial_file",
     "read_vehicle",
     "require_inertia",
     "vehicle_findings",

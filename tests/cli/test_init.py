@@ -1,0 +1,69 @@
+"""`jaxsub init` writes a vehicle file that other commands take, and nothing for dimensions that cannot be."""
+
+import json
+
+import numpy as np
+import pytest
+from commands import ran
+
+from jaxsub.cli.app import KINDS
+from jaxsub.cli.quantity import DIMENSIONS
+from jaxsub.recording import Recording, save
+from jaxsub.vehicle import initial, read_vehicle
+
+AUV = ("--length", "1.33m", "--diameter", "19.1 cm", "--mass", "30.5")
+
+
+def test_kinds_and_dimensions_are_those_of_the_vehicles():
+    assert set(KINDS) == initial.KINDS.keys()
+    assert {name.replace("-", "_"): unit for name, (unit, _) in DIMENSIONS.items()} == initial.SIZES
+
+
+def test_it_prints_or_writes_one_file(monkeypatch, capsys, tmp_path):
+    """Claim: units are converted, the terminal shows the file that is written, and a second call is refused."""
+    code, shown = ran(monkeypatch, capsys, "init", "auv", *AUV)
+    assert code == 0 and "diameter = 0.191\n" in shown.out
+    out = tmp_path / "auv.toml"
+    code, said = ran(monkeypatch, capsys, "init", "auv", *AUV, "--out", out)
+    assert code == 0 and "18 coefficients; inputs thrust = thrust" in said.out
+    assert out.read_text() == shown.out
+    assert float(read_vehicle(out).values()["mass"]) == 30.5
+    assert ran(monkeypatch, capsys, "init", "auv", *AUV, "--out", out)[0] == 2
+    out.write_text("mine")
+    code, said = ran(monkeypatch, capsys, "init", "auv", *AUV, "--out", out, "--overwrite")
+    assert code == 2 and "has changed since" in said.err and out.read_text() == "mine"
+
+
+def test_its_file_fits_its_log(monkeypatch, capsys, tmp_path):
+    """Claim: `check` takes the file begun with a log and that log, and has no error and no unit to complain of."""
+    t = 0.1 * np.arange(100)
+    columns = {
+        "rudder_cmd": 0.1 * np.sin(t),
+        "r": -0.1 * np.sin(t - 1.0),
+        "psi": 0.1 * np.cos(t),
+        "volts": 12.0 + t,
+    }
+    save(Recording("run", t, columns, "run"), tmp_path / "run.csv", {"rudder_cmd": "deg", "r": "deg/s"})
+    out = tmp_path / "auv.toml"
+    code, said = ran(monkeypatch, capsys, "init", "auv", *AUV, "--log", tmp_path / "run.csv", "--out", out, "--json")
+    content = json.loads(said.out)
+    assert code == 0 and content["inputs"] == {"rudder": "rudder_cmd"} and content["outputs"] == ["r", "psi"]
+    assert content["unused"] == ["volts"]
+    code, said = ran(monkeypatch, capsys, "check", out, tmp_path / "run.csv", "--json")
+    assert code == 0 and json.loads(said.out)["errors"] == 0
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--length", "-1"), "'-1' is not above zero"),
+        (("--length", "0"), "'0' is not above zero"),
+        (("--length", "3kg"), "'3kg' is not in m"),
+        (("--length", "3 furlong"), "unknown unit 'furlong'"),
+        (("--length", "long"), "'long' is no number"),
+        (("--length", "1", "--mass", "2"), "--diameter: is missing for an AUV"),
+    ],
+)
+def test_dimensions_that_cannot_be_are_bad_input(monkeypatch, capsys, given, said):
+    code, printed = ran(monkeypatch, capsys, "init", "auv", *given)
+    assert code == 2 and said in printed.err and printed.out == ""

@@ -1,0 +1,112 @@
+"""Vehicle files begun from dimensions: they read, move as vehicles do, and hold what is published of such vehicles."""
+
+import tomllib
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from rigs import stacked
+
+from jaxsub.errors import InputError
+from jaxsub.recording import Recording
+from jaxsub.simulate import integrate
+from jaxsub.vehicle import initial_file, vehicle_findings, vehicle_from
+
+SIZES = {"auv": {"length": 1.33, "diameter": 0.191, "mass": 30.5}}
+# of the kinds' inputs, in SI, a usual command
+COMMANDS = {"thrust": 5.0, "rudder": 0.1, "stern_plane": 0.05}
+
+
+def begun(kind, log=None, **more):
+    return vehicle_from(tomllib.loads(initial_file(kind, SIZES[kind] | more, log).text()), kind)
+
+
+def log(**columns):
+    samples = {name: np.asarray(values, float) for name, values in columns.items()}
+    return Recording("run", 0.1 * np.arange(3), samples, "run.csv")
+
+
+@pytest.mark.parametrize("kind", SIZES)
+def test_a_file_is_short_and_has_nothing_odd(kind):
+    """Claim: it is a vehicle without findings in 60 lines, whose free numbers all have a prior about their value."""
+    assert len(initial_file(kind, SIZES[kind]).text().splitlines()) <= 60
+    vehicle = begun(kind)
+    assert vehicle_findings(vehicle, kind) == ()
+    assert vehicle.layout.free
+    values = vehicle.values()
+    for row in vehicle.layout.free:
+        assert 0.0 < row.prior_std < np.inf and row.prior_mean == float(values[row.name])
+
+
+@pytest.mark.parametrize("kind", SIZES)
+def test_from_rest_it_stays_or_moves_as_far_as_it_is_driven(kind):
+    """Claim: without a command it does not move, and two minutes of commands leave it below 3 m/s and 2 rad/s."""
+    vehicle = begun(kind)
+    layout, times = vehicle.layout, 0.5 * np.arange(241)
+    runs = []
+    for driven in (0.0, 1.0):
+        columns = {column: np.full(len(times), driven * COMMANDS[name]) for name, column in layout.inputs}
+        columns |= {channel: np.full(len(times), np.nan) for channel in layout.channels}
+        runs.append(Recording(f"run {driven}", times, columns, "run"))
+    rest = jnp.zeros((2, len(layout.states)))
+    still, moved = np.asarray(integrate(vehicle, stacked(vehicle, runs), rest))[:, :, : len(layout.equations)]
+    linear = np.array([e in ("surge", "sway", "heave") for e in layout.equations])
+    assert abs(still).max() < 1e-2  # of weight and buoyancy that are rounded
+    assert abs(moved[:, linear]).max() < 3.0 and abs(moved[:, ~linear]).max() < 2.0
+    assert moved[-1, 0] > 0.3
+
+
+# Prestero (2001), of the REMUS 100
+REMUS = {
+    "X_udot": -0.93, "Y_vdot": -35.5, "Z_wdot": -35.5, "M_qdot": -4.88, "N_rdot": -4.88, "Y_rdot": 1.93,
+    "Z_qdot": -1.93, "X_u|u|": -1.62, "Y_v|v|": -131.0, "Z_w|w|": -131.0,
+}  # fmt: skip
+
+
+def test_an_auv_of_the_size_of_remus_has_its_coefficients():
+    """Claim: Prestero's are within two standard deviations, added mass within a quarter."""
+    estimates = initial_file("auv", SIZES["auv"]).coefficients
+    for name, published in REMUS.items():
+        assert abs(estimates[name].value - published) < 2.0 * estimates[name].std, name
+    for name in ("X_udot", "Y_vdot", "Z_wdot", "M_qdot", "N_rdot"):
+        assert estimates[name].value == pytest.approx(REMUS[name], rel=0.25), name
+
+
+def test_inputs_and_outputs_are_columns_of_the_log():
+    """Claim: columns are taken by name and unit, what the vehicle has no use for is listed, and each once."""
+    file = initial_file("auv", SIZES["auv"], log(rudder_cmd=[0, 1, 0], r=[0, 0, 0], depth=[1, 1, 1], battery=[3, 3, 3]))
+    vehicle = vehicle_from(tomllib.loads(file.text()), "auv")
+    assert dict(vehicle.layout.inputs) == {"rudder": "rudder_cmd"}
+    assert vehicle.layout.channels == ("r", "depth")
+    assert file.unused == ["battery"] and "battery" in file.text()
+    assert {"X_0", "Z_uq", "M_uq"} <= file.coefficients.keys()  # a constant thrust, and stern planes that stand still
+    assert not {"Y_ur", "N_ur"} & file.coefficients.keys()
+
+
+def test_a_fixed_fin_is_the_fin_that_is_not_deflected():
+    """Claim: a log without a rudder gives the accelerations in a drift that one with a rudder amidships gives."""
+    state = jnp.array([1.4, 0.1, -0.05, 0.02, 0.1, -0.2, 0.0, 0.1, 0.0, 2.0])
+    every = begun("auv", log(delta_r=[0, 0, 0], delta_s=[0, 0, 0], thrust=[0, 0, 0], r=[0, 0, 0]))
+    fixed = begun("auv", log(thrust=[0, 0, 0], r=[0, 0, 0]))
+    moving = [np.asarray(v.acceleration(state, jnp.zeros(len(v.layout.inputs)))) for v in (every, fixed)]
+    assert moving[0] == pytest.approx(moving[1], rel=1e-2, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "said"),
+    [
+        ("auv", {"length": 1.0, "mass": 3.0}, "--diameter: is missing for an AUV"),
+        ("auv", {"length": 1.0, "mass": 3.0, "diameter": 0.2, "draught": 1.0}, "--draught: is no dimension of an AUV"),
+        ("auv", {"length": 1.0, "mass": -3.0, "diameter": 0.2}, "--mass: is -3"),
+        ("auv", {"length": 1.0, "mass": 300.0, "diameter": 0.2}, "--mass: is 300 kg, and a cylinder"),
+        ("auv", {"length": 1.0, "mass": 3.0, "diameter": 0.2, "fin_span": 0.1}, "--fin-chord: is missing"),
+    ],
+)
+def test_dimensions_that_cannot_be_are_refused(kind, given, said):
+    with pytest.raises(InputError, match=said):
+        initial_file(kind, given)
+
+
+def test_a_log_without_a_channel_is_refused():
+    with pytest.raises(InputError, match="has none of the channels u, v"):
+        initial_file("auv", SIZES["auv"], log(battery=[3, 3, 3]))
