@@ -14,7 +14,7 @@ _PATH = process.Location()
 # said here and not asked of `estimate`, so that `--help` needs no jax; a test holds the two together
 METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
 STARTS = ("rest", "recorded", "estimated")
-KINDS = ("auv",)
+KINDS = ("auv", "glider", "rov", "ship", "usv")
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
 _columns = click.option("--columns", type=_PATH, help="A TOML file that says which channels of a log to take.")

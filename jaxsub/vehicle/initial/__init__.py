@@ -6,9 +6,18 @@ from ...recording import Recording
 from .auv import AUV, auv
 from .columns import Columns
 from .file import InitialFile
+from .floating import SHIP, USV, ship, usv
+from .glider import GLIDER, glider
+from .rov import ROV, rov
 from .sizes import SIZES, Kind, Sizes
 
-KINDS: dict[str, tuple[Kind, Callable[[Sizes, Columns], InitialFile]]] = {"auv": (AUV, auv)}
+KINDS: dict[str, tuple[Kind, Callable[[Sizes, Columns], InitialFile]]] = {
+    "auv": (AUV, auv),
+    "glider": (GLIDER, glider),
+    "rov": (ROV, rov),
+    "ship": (SHIP, ship),
+    "usv": (USV, usv),
+}
 
 __all__ = ["KINDS", "SIZES", "InitialFile", "initial_file"]
 

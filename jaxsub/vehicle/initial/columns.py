@@ -13,6 +13,7 @@ from ...units import si_unit
 
 # of channels that say the same, the first that there is
 _SAME = (("z", "depth"), ("r", "heading_rate"), ("u", "speed"), ("w", "depth_rate"))
+_SAID_OF_ANY = ("", "cmd", "command", "setpoint", "sp", "ref", "demand", "pwm", "angle", "deg", "rad", "value")
 # of a usual suite: Doppler log, MEMS gyros, attitude, pressure depth
 _SIGMAS = {
     **dict.fromkeys("uvw", 0.01), **dict.fromkeys("pqr", 0.0035), "phi": 0.005, "theta": 0.005, "psi": 0.005, "z": 0.05
@@ -46,7 +47,7 @@ class Columns:
         self._left = [] if log is None else [name for name in log.columns if name not in CHANNEL_UNITS]
 
     def take(self, words: str, units: Sequence[str], stated: bool = False) -> Command | None:
-        """The first column left whose name has one of `words`, a pattern, and whose unit is one of `units`.
+        """The first column left whose name is one of `words`, a pattern, and whose unit is one of `units`.
 
         None in a log without such a column. `units` are SI, any where there are none; a unit that the log does not
         state is SI, unless it has to be `stated`.
@@ -56,7 +57,7 @@ class Columns:
         for name in self._left:
             unit = self.log.units.get(name, "")
             fits = not units or not (unit or stated) or unit in [si_unit(one) or "1" for one in units]
-            if fits and re.search(rf"(?:^|[^a-z])(?:{words})(?:$|[^a-z])", name.lower()):
+            if fits and re.fullmatch(words, _plain(name)):
                 self._left.remove(name)
                 return Command(name, unit, self.log.columns[name])
         return None
@@ -82,3 +83,9 @@ class Columns:
         assert self.log is not None
         unit = self.log.units.get(channel, "")
         return not unit or unit == si_unit(CHANNEL_UNITS[channel])
+
+
+def _plain(name: str) -> str:
+    """A column's name in small letters, without words that say how it is known."""
+    parts = re.split(r"[^a-z0-9]+", name.lower())
+    return "_".join(part for part in parts if part not in _SAID_OF_ANY)

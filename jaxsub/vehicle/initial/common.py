@@ -12,17 +12,23 @@ SUBMERGED = (
 SURFACE = ("u", "v", "r", "psi", "x", "y", "speed", "heading_rate", "ax", "ay")
 
 
-def put_body(file: InitialFile, sizes: Sizes, inertia: tuple[float, float, float], source: str, height: float) -> None:
-    """`[body]` of a submerged vehicle that is trimmed, its `inertia` kg m² from `source`, its hull of `height` m."""
-    weight = GRAVITY * sizes.mass
+def put_body(file: InitialFile, sizes: Sizes, inertia: tuple[float, float, float], source: str, width: float) -> None:
+    """`[body]` with the `inertia` (kg m²) from `source`, of a hull of that largest `width` (m)."""
     file.put("body", "mass", sizes.mass)
-    file.put("body", "buoyancy", Estimate.within(0.01, weight).toml(free=True), "as the weight: trimmed")
     file.put("body", "inertia", vector(*inertia), source)
-    above = Estimate(-0.07 * height, 0.05 * height)
-    file.put("body", "centre_of_buoyancy", f"[0.0, 0.0, {above.toml(free=True)}]", "a guess: 7 % of the height above")
-    file.put("body", "speed", sizes.speed, "usual speed; the friction line's")
+    file.put("body", "speed", sizes.speed, "usual speed, at which friction was estimated")
     file.put("body", "length", sizes.length)
+    file.put("body", "diameter", width)
     file.put("body", "reference_density", sizes.density)
+
+
+def put_trim(file: InitialFile, sizes: Sizes, height: float) -> None:
+    """Buoyancy of a submerged vehicle of that `height` (m) that is trimmed, and where it acts."""
+    weight = Estimate.within(0.01, GRAVITY * sizes.mass)
+    # to more digits than it is known: a difference to the weight would make it sink
+    file.put("body", "buoyancy", weight.toml(free=True, digits=8), "as the weight: trimmed")
+    above = Estimate(-0.07 * height, 0.05 * height)
+    file.put("body", "centre_of_buoyancy", f"[0.0, 0.0, {above.toml(free=True)}]", "7 % of the height: a guess")
 
 
 def put_thrust(file: InitialFile, columns: Columns, sizes: Sizes, drag: Estimate) -> None:

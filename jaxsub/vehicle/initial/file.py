@@ -21,10 +21,10 @@ class Estimate:
         """A number that is uncertain by a `part` of itself."""
         return cls(value, abs(part * value), source)
 
-    def toml(self, free: bool = False) -> str:
-        """The number with its prior; `free` where it would otherwise be fixed."""
+    def toml(self, free: bool = False, digits: int = 4) -> str:
+        """The number to so many `digits` with its prior; `free` where it would otherwise be fixed."""
         freed = "free = true, " if free else ""
-        return f"{{ value = {number(self.value)}, {freed}prior_std = {number(self.std)} }}"
+        return f"{{ value = {number(self.value, digits)}, {freed}prior_std = {number(self.std)} }}"
 
 
 @dataclasses.dataclass
@@ -75,9 +75,9 @@ class InitialFile:
         return "\n".join(lines) + "\n"
 
 
-def number(value: float) -> str:
-    """A number to four digits, as TOML."""
-    return repr(float(f"{value:.4g}"))
+def number(value: float, digits: int = 4) -> str:
+    """A number to so many digits, as TOML."""
+    return repr(float(f"{value:.{digits}g}"))
 
 
 def vector(*values: float) -> str:

@@ -40,20 +40,33 @@ class Fins:
         return Estimate.within(_KNOWN if self.given else _TYPICAL, lift_slope(2.0 * self.span / self.chord), source)
 
     @property
+    def induced(self) -> float:
+        r"""$C_{L\alpha}/\pi\Lambda$: induced drag by the lift and its angle."""
+        return self.slope.value / (math.pi * 2.0 * self.span / self.chord)
+
+    @property
     def lift(self) -> float:
         r"""$\tfrac12\rho SC_{L\alpha}$, N/(m/s)²/rad."""
         return 0.5 * self.density * self.area * self.slope.value
 
     @property
     def water(self) -> float:
-        r"""Added mass across the fins, kg: $\pi\rho(a - r^2/a)^2c$ with a and r of tip and root. Blevins (1979)."""
+        r"""Added mass across the fins, kg: $\pi\rho(a - r^2/a)^2c$ by slender-body theory, a and r of tip and root.
+
+        Of fins with the aspect ratio $\Lambda$ it is $1/\sqrt{1 + \Lambda^2}$ of that, as of rectangular plates.
+        Source: Blevins (1979), tables 14-1 and 14-3; Prestero (2001), ch. 4.
+        """
         tip = self.root + self.span
-        return math.pi * self.density * (tip - self.root**2 / tip) ** 2 * self.chord
+        return math.pi * self.density * (tip - self.root**2 / tip) ** 2 * self.chord * self._short
 
     @property
     def rolling(self) -> float:
-        r"""Half of the added inertia in roll of a cross of two pairs, $\tfrac2\pi\rho a^4c$ (kg m²). Blevins (1979)."""
-        return self.density * (self.root + self.span) ** 4 * self.chord / math.pi
+        r"""Half of the added inertia in roll of a cross of two pairs, $\tfrac2\pi\rho a^4c$ (kg m²), as `water` is."""
+        return self.density * (self.root + self.span) ** 4 * self.chord / math.pi * self._short
+
+    @property
+    def _short(self) -> float:
+        return 1.0 / math.hypot(1.0, 2.0 * self.span / self.chord)
 
     @property
     def roll_damping(self) -> float:
