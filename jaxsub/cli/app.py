@@ -160,6 +160,30 @@ def init(kind: str, log: Path | None, columns: Path | None, out: Path | None, ov
     command.run(kind, {name: size for name, size in sizes.items() if size is not None}, log, columns, out, overwrite)
 
 
+@app.command("import")
+@click.argument("file", type=_PATH)
+@_out(required=True)
+@_overwrite
+@common
+def import_(file: Path, out: Path, overwrite: bool) -> None:
+    """Write a Gazebo model (SDF) as a vehicle file, and name what of it is not translated."""
+    from . import simulators as command
+
+    command.run_import(file, out, overwrite)
+
+
+@app.command()
+@_vehicle
+@click.option("--sdf", type=_PATH, required=True, help="Where the model for Gazebo goes.")
+@_overwrite
+@common
+def export(vehicle: Path, sdf: Path, overwrite: bool) -> None:
+    """Write a vehicle as a model for Gazebo (SDF), and name what of it is not translated."""
+    from . import simulators as command
+
+    command.run_export(vehicle, sdf, overwrite)
+
+
 @app.command()
 @click.argument("log", type=_PATH)
 @click.argument("words", nargs=-1)

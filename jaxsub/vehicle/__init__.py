@@ -5,6 +5,7 @@ from .base import AbstractVehicle, Layout, Output
 from .build import build
 from .checks import require_inertia
 from .dimensions import check_units
+from .gazebo import read_sdf, sdf_text
 from .initial import InitialFile, initial_file
 from .mechanism import Mechanism
 from .oddities import vehicle_findings
@@ -23,8 +24,10 @@ __all__ = [
     "build",
     "check_units",
     "initial_file",
+    "read_sdf",
     "read_vehicle",
     "require_inertia",
+    "sdf_text",
     "vehicle_findings",
     "vehicle_from",
     "vehicle_text",

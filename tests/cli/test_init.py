@@ -25,7 +25,7 @@ def test_it_prints_or_writes_one_file(monkeypatch, capsys, tmp_path):
     assert code == 0 and "diameter = 0.191\n" in shown.out
     out = tmp_path / "auv.toml"
     code, said = ran(monkeypatch, capsys, "init", "auv", *AUV, "--out", out)
-    assert code == 0 and "18 coefficients; inputs thrust = thrust" in said.out
+    assert code == 0 and "18 coefficients; inputs propeller = thrust" in said.out
     assert out.read_text() == shown.out
     assert float(read_vehicle(out).values()["mass"]) == 30.5
     assert ran(monkeypatch, capsys, "init", "auv", *AUV, "--out", out)[0] == 2

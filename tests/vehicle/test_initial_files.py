@@ -22,7 +22,7 @@ SIZES = {
 }
 # of the kinds' inputs, in SI, a usual command
 COMMANDS = {
-    "thrust": 5.0, "rudder": 0.1, "stern_plane": 0.05, "engine": -2.5e-4, "pitch_mass": 0.02, "shaft_speed": 60.0,
+    "propeller": 5.0, "rudder": 0.1, "stern_plane": 0.05, "engine": -2.5e-4, "pitch_mass": 0.02, "shaft_speed": 60.0,
     "port": 20.0, "starboard": 15.0, "t1": 10.0, "t2": 12.0, "t3": -10.0, "t4": -10.0, "t5": 2.0, "t6": 2.0, "t7": 2.0,
     "t8": 2.0,
 }  # fmt: skip

@@ -38,19 +38,24 @@ def put_thrust(file: InitialFile, columns: Columns, sizes: Sizes, drag: Estimate
     command, or the constant, is as much as the `drag` (N/(m/s)²) at the usual speed.
     """
     needed = drag.value * sizes.speed**2
-    if columns.log is None or (command := columns.take("thrust|force|t", ["N"])):
-        file.put("inputs", "thrust", f'"{command.column if columns.log else "thrust"}"', "N, along x")
-    elif command := columns.take("n|rpm|rps|shaft|prop|propeller|motor|thruster", ["rad/s"], stated=True):
-        file.put("inputs", "shaft_speed", f'"{command.column}"')
+    propeller = r"n|rpm|rps|shaft|shaft_speed|prop|propeller|propeller_speed|motor|thruster|throttle|thrust|force|t"
+    if command := columns.take(propeller, ["rad/s"], stated=True):
+        file.put("inputs", "shaft_speed", f'"{command.column}"', "rad/s")
         file.add(Estimate.within(1.0, needed / command.largest**2, "drag at the usual speed by the largest n"), "X_nn")
-    elif command := columns.take("n|rpm|rps|shaft|prop|propeller|motor|thruster|throttle|pwm|thrust", []):
-        file.put("inputs", "propeller", command.toml)
-        forward = Estimate.within(1.0, needed / command.largest**2).toml(free=True)
-        place = vector(-sizes.length / 2.0, 0.0, 0.0)
-        table = f'{{ kind = "thruster", position = {place}, direction = [1, 0, 0], forward = {forward} }}'
-        file.put("actuators", "propeller", table, "drag at the usual speed by the largest command")
-    else:
+        return
+    command = columns.take(propeller, ["N"], stated=True) or columns.take(propeller, [])
+    if columns.log is not None and command is None:
         file.add(Estimate.within(0.6, needed, "thrust that keeps the usual speed: the log has none"), "X_0")
+        return
+    force = command is None or command.unit == "N"
+    curve = f"gain = {Estimate(1.0, 0.1).toml(free=True)}"
+    if command is not None and not force:
+        curve = f"forward = {Estimate.within(1.0, needed / command.largest**2).toml(free=True)}"
+    place = vector(-sizes.length / 2.0, 0.0, 0.0)
+    file.put("inputs", "propeller", '{ column = "thrust", unit = "N" }' if command is None else command.toml)
+    table = f'{{ kind = "thruster", position = {place}, direction = [1.0, 0.0, 0.0], {curve} }}'
+    said = "the command is the thrust" if force else "drag at the usual speed by the largest command"
+    file.put("actuators", "propeller", table, said)
 
 
 def put_outputs(file: InitialFile, columns: Columns, moved: tuple[str, ...]) -> None:

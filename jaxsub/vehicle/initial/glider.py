@@ -9,7 +9,7 @@ from .slender import add_hull, add_water, put_slender
 
 GLIDER = Kind("a glider", ("diameter",), ("fin_span", "fin_chord"), speed=0.35)
 # of a wing by the length, and of the upright tail by the diameter, as the Slocum has them
-_WING, _TAIL = (0.27, 0.065, -0.05), (0.6, 0.6, -0.45)
+_WING, _TAIL = (0.27, 0.065, -0.05), (0.5, 0.6, -0.45)
 # part of the mass that moves, as the Slocum's battery does
 _MOVED = 0.2
 
@@ -21,7 +21,7 @@ def glider(sizes: Sizes, columns: Columns) -> InitialFile:
     length, diameter, given = sizes.length, sizes.diameter, sizes.fin_span > 0.0
     span, chord = (sizes.fin_span, sizes.fin_chord) if given else (_WING[0] * length, _WING[1] * length)
     wings = Fins(span, chord, diameter / 2.0, _WING[2] * length, sizes.density, given)
-    tail = Fins(_TAIL[0] * diameter / 2.0, _TAIL[1] * diameter, 0.3 * diameter, _TAIL[2] * length, sizes.density, False)
+    tail = Fins(_TAIL[0] * diameter, _TAIL[1] * diameter, 0.3 * diameter, _TAIL[2] * length, sizes.density, False)
     add_water(file, sizes, tail, wings)
     add_hull(file, sizes, tail, wings)
     wings.fix(file, upright=False)
