@@ -96,7 +96,7 @@ def _facts(vehicle):
         layout.kind, layout.equations, inputs, layout.channels, tuple(name for name, _ in layout.environment),
         layout.length, layout.diameter, every(layout.equations, 0.3), 0.1, 2.0, coordinates,
         every(inputs, (0.1, 0.2, 1.0)), every(layout.channels, (0.0, 0.2)), (0.0, 2.0),
-        every(layout.equations, (1.0,)), 9,
+        every(layout.equations, (1.0,)), 9, fixed_gains=vehicle.fixed_gains,
     )  # fmt: skip
 
 

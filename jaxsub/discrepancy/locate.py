@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, Motion, by_name, velocities
+from ..effects import AbstractEffect, AbstractInstrument, Motion, by_name, velocities
 from ..likelihood import Disturbance
 from ..recording import Recording
 from .columns import differences, force_columns, output_columns
@@ -65,7 +65,7 @@ def shares(view: View, scan: Scan) -> dict[str, float]:
         without = np.where(np.arange(len(view.vehicle.layout.equations)) == i, 1e-3, 1.0) * view.disturbance.force
         found[equation] = max(0.0, whole - _likelihood(view, dataclasses.replace(view.disturbance, force=without)))
     for effect, statistic, right in zip(scan.effects, scan.statistic, scan.right, strict=True):
-        for place in effect.where if right and isinstance(effect, AbstractInstrument | AbstractActuator) else ():
+        for place in effect.where if right and _on_device(effect) else ():
             found[place] = max(found.get(place, 0.0), 0.5 * float(statistic) / len(effect.where))
     total = max(sum(found.values()), 1e-300)
     return {place: part / total for place, part in found.items()}
@@ -85,7 +85,7 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
     for effect, whole in zip(effects, differences(view, effects), strict=True):
         if isinstance(effect, AbstractInstrument):
             shown += [(f"sensor:{c}", whole * (np.asarray(channels) == c)) for c in effect.channels]
-        elif isinstance(effect, AbstractActuator):
+        elif _on_device(effect):
             pushed.append((effect.where[0], whole))
         else:
             pushed += [(e, whole * (np.arange(len(equations)) == i)) for i, e in enumerate(equations)]
@@ -97,6 +97,11 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
         found[place] = found.get(place, 0.0) + float(part)
     total = max(sum(found.values()), 1e-300)
     return {place: part / total for place, part in found.items()}
+
+
+def _on_device(effect: AbstractEffect) -> bool:
+    """Whether an effect lies at an actuator or a sensor, and not in equations."""
+    return all(":" in place for place in effect.where)
 
 
 def locations(field: Field, view: View, recordings: Sequence[Recording], share: dict[str, float]) -> list[Location]:

@@ -227,6 +227,7 @@ def facts(view: View) -> Facts:
         tones=dict(zip(layout.equations, shaking, strict=False)),
         frequencies=frequencies,
         has=view.vehicle.has,
+        fixed_gains=view.vehicle.fixed_gains,
     )
 
 

@@ -1,6 +1,7 @@
 """The vocabulary of left-out physics: every effect that a diagnosis may name, a file or two a family."""
 
 from .actuator_curves import ActuatorDeadband, ActuatorMisalignment, ActuatorSaturation, ControlSurfaceStall
+from .actuator_gain import ActuatorGain
 from .actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
 from .base import (
     AbstractActuator,
@@ -37,6 +38,7 @@ from .motion import (
     FORCES,
     GRAVITY,
     VELOCITIES,
+    AbstractActuation,
     Facts,
     Motion,
     Signal,
@@ -62,6 +64,7 @@ __all__ = [
     "KNOTS",
     "VELOCITIES",
     "VOCABULARY",
+    "AbstractActuation",
     "AbstractActuator",
     "AbstractCurve",
     "AbstractDerivative",
@@ -73,6 +76,7 @@ __all__ = [
     "ActuatorBacklash",
     "ActuatorDeadband",
     "ActuatorDelay",
+    "ActuatorGain",
     "ActuatorLag",
     "ActuatorMisalignment",
     "ActuatorRateLimit",

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from ..arrays import namespace
 from .motion import EQUATIONS, FORCES, VELOCITIES, Motion, Signal, unit_per
@@ -165,6 +165,10 @@ class Derivative:
             rest = tuple(name for name in own if name != "elevator")
             return (own, (*rest, "elevator_right", "elevator_left"))
         return (own,) if own else ()
+
+    def through(self, inputs: Collection[str]) -> tuple[str, ...]:
+        """The actuators that the product is taken from where there are `inputs`; none where it needs others."""
+        return next((way for way in self.needs() if set(way) <= set(inputs)), ())
 
     def product(self, motion: Motion) -> Signal | float:
         """The product along a motion, of its shape; 1 for a constant.

@@ -1,5 +1,7 @@
 """What a force, an actuator or a sensor may look at: the motion at one time, or along a whole run."""
 
+import abc
+
 import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
@@ -34,6 +36,17 @@ def unit_per(equation: str, *variables: str) -> str:
     return "/".join([force, *units]) if equation in EQUATIONS else "1"
 
 
+class AbstractActuation(eqx.Module):
+    """What the actuators of a model do."""
+
+    @abc.abstractmethod
+    def force_of(self, name: str, motion: "Motion") -> dict[str, Signal]:
+        """Generalised force (N or N m) by equation of the actuator `name` alone, of the motion's shape.
+
+        **Raises** `KeyError` for one that the model lacks.
+        """
+
+
 class Motion(eqx.Module):
     """The state of a vehicle and what acts on it, by name; every leaf may carry leading (time) axes.
 
@@ -50,6 +63,7 @@ class Motion(eqx.Module):
     - `time`: s from the run's own start.
     - `accelerations`: rates of the free equations' velocities, where an accelerometer asks for them.
     - `water`: velocity of the water over ground in body axes (m/s), by the equation of the body's own; absent at rest.
+    - `actuation`: the forces of the model's own actuators, each by itself.
     """
 
     rates: dict[str, Signal]
@@ -63,6 +77,7 @@ class Motion(eqx.Module):
     time: Signal | float = 0.0
     accelerations: dict[str, Signal] = eqx.field(default_factory=dict)
     water: dict[str, Signal] = eqx.field(default_factory=dict)
+    actuation: AbstractActuation | None = None
 
     @property
     def flow(self) -> dict[str, Signal]:
@@ -97,6 +112,7 @@ class Facts(eqx.Module):
     - `depth_range`: least and largest depth, m.
     - `has`: what the vehicle's own equations contain of what an effect could say: names of `Derivative`s, `coriolis`.
       An actuator by a name of its own has those of its force; a control surface has one such as `N_uu_port_fin`.
+    - `fixed_gains`: the vehicle's actuators whose force no free number of its own scales as a whole.
     - `tones`: frequencies (rad/s) at which what each equation misses stands out, inside `wave_band`; `frequencies`: how
       many they were chosen among.
 
@@ -120,6 +136,7 @@ class Facts(eqx.Module):
     tones: dict[str, tuple[float, ...]] = eqx.field(default_factory=dict)
     frequencies: int = 0
     has: frozenset[str] = frozenset()
+    fixed_gains: tuple[str, ...] = ()
 
     @property
     def largest_commands(self) -> dict[str, float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from .actuator_curves import ActuatorDeadband, ActuatorMisalignment, ActuatorSaturation, ControlSurfaceStall
+from .actuator_gain import ActuatorGain
 from .actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
 from .base import AbstractActuator, AbstractDerivative, AbstractEffect, AbstractForce, AbstractInstrument
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
@@ -48,6 +49,7 @@ VOCABULARY: tuple[type[AbstractEffect], ...] = (
     ActuatorDeadband,
     ActuatorBacklash,
     ActuatorMisalignment,
+    ActuatorGain,
     ControlSurfaceStall,
     PropellerRace,
     PropellerTorque,

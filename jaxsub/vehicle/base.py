@@ -160,6 +160,11 @@ class AbstractVehicle(eqx.Module):
         return frozenset()
 
     @property
+    @abc.abstractmethod
+    def fixed_gains(self) -> tuple[str, ...]:
+        """The actuators whose force no free number of its own scales as a whole (`Facts.fixed_gains`)."""
+
+    @property
     def aliases(self) -> dict[str, str]:
         """Names that expressions may have for numbers of effects, with the names of those numbers."""
         return {}

@@ -124,7 +124,7 @@ def check_coefficients(terms: Mapping[str, Derivative | None], layout: Layout, w
             close = nearest(name, _usual_coefficients())
             raise InputError(place, "unknown key", f"{f'did you mean {close}? ' if close else ''}known: {GRAMMAR}")
         ways = term.needs()
-        if ways and not any(set(way) <= actuators for way in ways):
+        if ways and not term.through(actuators):
             raise InputError(
                 place, f"acts through {' and '.join(ways[0])}", "name that actuator's column under [inputs]"
             )
@@ -169,7 +169,8 @@ def _check_force(effect: AbstractForce, vehicle: SubmergedBody | Mechanism, plac
     try:
         felt = set(effect.force(motion)) & set(layout.equations)
     except KeyError as error:  # it looks for a motion, an actuator or a recorded column by its name
-        known = (*layout.equations, *dict(layout.inputs), *dict(layout.environment))
+        devices = vehicle.actuators.items if isinstance(vehicle, SubmergedBody) else ()
+        known = (*layout.equations, *dict(layout.inputs), *dict(layout.environment), *(one.name for one in devices))
         raise unknown_key(f"{place}: {error.args[0]}", known, str(error.args[0])) from error
     if not felt:
         raise InputError(

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from ..arrays import Values, namespace
 from ..effects import AbstractEffect, Motion, Signal
 from ..parameters import number
+from .actuation import RigActuation
 from .base import AbstractVehicle, Layout, timed
 
 
@@ -58,7 +59,10 @@ class Mechanism(AbstractVehicle):
         actuators = dict(zip(names, columns[: len(names)], strict=True))
         surroundings = dict(zip(environment, columns[len(names) :], strict=True))
         inertia, damping = self.mass_matrix(), self.damping_matrix()
-        return Motion(rates, positions, actuators, surroundings, inertia, 0.0, 0.0, damping, time)
+        return Motion(
+            rates, positions, actuators, surroundings, inertia, 0.0, 0.0, damping, time,
+            actuation=RigActuation(self._drives),
+        )  # fmt: skip
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
         """Springs, drives and constants."""
@@ -69,6 +73,12 @@ class Mechanism(AbstractVehicle):
             total[e] = self._value(f"F_{e}") - spring + drive
         return total
 
+    @property
+    def fixed_gains(self) -> tuple[str, ...]:
+        """The inputs of which not every `B_q_input` is free."""
+        free = {row.name for row in self.layout.free}
+        return tuple(a for a, own in self._drives.items() if not {f"B_{e}_{a}" for e in own} <= free)
+
     def own_position_rates(self, motion: Motion) -> dict[str, Signal]:
         """The rates themselves."""
         return motion.rates
@@ -77,6 +87,13 @@ class Mechanism(AbstractVehicle):
         """Each coordinate `q` and its rate `q_rate`."""
         coordinates = {name: motion.positions[name] for name in self.layout.equations}
         return coordinates | {f"{name}_rate": rate for name, rate in motion.rates.items()}
+
+    @property
+    def _drives(self) -> dict[str, dict[str, Array]]:
+        """B by actuator and coordinate, of those that there are."""
+        inputs, equations, values = self.layout.inputs, self.layout.equations, self.coefficients
+        found = {a: {e: values[f"B_{e}_{a}"] for e in equations if f"B_{e}_{a}" in values} for a, _ in inputs}
+        return {a: own for a, own in found.items() if own}
 
     def _value(self, name: str) -> Values:
         return self.coefficients.get(name, np.zeros(()))

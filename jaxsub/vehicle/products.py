@@ -1,6 +1,6 @@
 """Forces of the water, the fins and the propeller that are products of motions and inputs."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import equinox as eqx
 from jaxtyping import Array, Float
@@ -39,6 +39,13 @@ class Products(eqx.Module):
         if "thrust" in motion.actuators and _THRUST not in terms.values():
             total["surge"] = total.get("surge", 0.0) + motion.actuators["thrust"]
         return total
+
+    def by(self, name: str, inputs: Collection[str]) -> dict[str, Derivative]:
+        """The derivatives, by symbol, that act through the input `name` where there are `inputs`."""
+        terms = derivatives(self.coefficients)
+        if "thrust" in inputs and _THRUST not in terms.values():
+            terms[_THRUST.name] = _THRUST
+        return {symbol: term for symbol, term in terms.items() if name in term.through(inputs)}
 
     def slopes(self, cruise: Signal) -> list[tuple[str, str, Signal]]:
         """Equation, equation of the velocity, and slope of each force that the velocity has at the speed `cruise`."""

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from ..arrays import Values
 from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal, coriolis, stream
 from ..parameters import number
+from .actuation import BodyActuation
 from .actuators import Actuators, stage_numbers
 from .base import AbstractVehicle, Layout, timed
 from .damping import Damping
@@ -109,8 +110,9 @@ class SubmergedBody(AbstractVehicle):
             damping = damping + sparse(places)
         water: dict[str, Signal] = dict(zip(EQUATIONS, _water(positions, environment, zero), strict=False))
         return Motion(
-            rates, positions, pick("input "), environment, inertia, buoyancy, self.cruise, damping, time, water=water
-        )
+            rates, positions, pick("input "), environment, inertia, buoyancy, self.cruise, damping, time, water=water,
+            actuation=self._actuation,
+        )  # fmt: skip
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
         """Products, actuators, restoring, Coriolis, what a current adds, and the damping of prescribed velocities."""
@@ -142,6 +144,11 @@ class SubmergedBody(AbstractVehicle):
         return frozenset((*(term.name for term in derivatives(names).values()), *self.actuators.names, *turning))
 
     @property
+    def fixed_gains(self) -> tuple[str, ...]:
+        """The devices whose `gain` is not free, and inputs of which not every coefficient is."""
+        return self._actuation.fixed_gains(self.layout)
+
+    @property
     def aliases(self) -> dict[str, str]:
         """Numbers of what stands before its actuators, such as `bow.time_constant`."""
         return stage_numbers(self.actuators.items, self.effects)
@@ -169,6 +176,10 @@ class SubmergedBody(AbstractVehicle):
                 full = {e: acceleration.get(e, jnp.zeros_like(u)) for e in EQUATIONS}
                 found[output.channel] = specific_force(motion, full, output.lever_arm)[output.channel]
         return found
+
+    @property
+    def _actuation(self) -> BodyActuation:
+        return BodyActuation(self.products, self.actuators)
 
     def _damping(self) -> Float[Values, "6 6"]:
         if self.coriolis != "linear":

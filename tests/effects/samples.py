@@ -3,9 +3,25 @@
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.effects import EQUATIONS, Facts, Motion, amplitudes, candidates, number_fields, with_numbers
+from jaxsub.effects import (
+    EQUATIONS,
+    AbstractActuation,
+    Facts,
+    Motion,
+    amplitudes,
+    candidates,
+    number_fields,
+    with_numbers,
+)
 
 CHANNELS = ("u", "r", "theta", "z", "ax", "depth_rate")
+
+
+class Quadratic(AbstractActuation):
+    """Each actuator pushes in sway by the square of its command."""
+
+    def force_of(self, name, motion):
+        return {"sway": 3.0 * abs(motion.actuators[name]) * motion.actuators[name]}
 
 
 def facts(kind="submerged-body", equations=EQUATIONS, actuators=("rudder", "elevator", "shaft_speed")):
@@ -15,7 +31,7 @@ def facts(kind="submerged-body", equations=EQUATIONS, actuators=("rudder", "elev
     return Facts(
         kind, tuple(equations), tuple(actuators), channels, ("temperature", "altitude"), 2.0, 0.2, rates, 0.1,
         60.0, {} if kind == "submerged-body" else places, inputs, outputs, (0.3, 4.0),
-        dict.fromkeys(equations, (0.9, 2.1)), 150,
+        dict.fromkeys(equations, (0.9, 2.1)), 150, fixed_gains=tuple(actuators),
     )  # fmt: skip
 
 
@@ -36,6 +52,7 @@ def motion(known, count=40, cruise=1.2, seed=1):
     return Motion(
         rates, positions | draw(memories), actuators, surroundings, inertia, 500.0 if body else 0.0,
         cruise if body else 0.0, jnp.asarray(-root @ root.T), jnp.linspace(0.0, 60.0, count), draw(known.equations),
+        actuation=Quadratic(),
     )  # fmt: skip
 
 
@@ -44,7 +61,7 @@ def still(now):
     zero = lambda named: {name: 0.0 * value for name, value in named.items()}
     return Motion(
         zero(now.rates), zero(now.positions), zero(now.actuators), now.environment, now.inertia, now.buoyancy, 0.0,
-        now.damping, now.time, zero(now.accelerations),
+        now.damping, now.time, zero(now.accelerations), actuation=now.actuation,
     )  # fmt: skip
 
 

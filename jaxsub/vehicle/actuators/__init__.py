@@ -3,6 +3,7 @@
 from .base import Actuator, Actuators
 from .read import KINDS, read_actuators
 from .stages import stage_numbers
+from .surfaces import Rudder
 from .write import actuator_tables
 
-__all__ = ["KINDS", "Actuator", "Actuators", "actuator_tables", "read_actuators", "stage_numbers"]
+__all__ = ["KINDS", "Actuator", "Actuators", "Rudder", "actuator_tables", "read_actuators", "stage_numbers"]

@@ -72,6 +72,11 @@ class MovingMass(Actuator):
 
     direction: tuple[float, float, float] = eqx.field(static=True, kw_only=True)
 
+    @property
+    def factor(self) -> str:
+        """The mass."""
+        return "mass"
+
     def acts_on(self) -> tuple[str, ...]:
         """About the axes across a horizontal direction; all of them with the attitude."""
         return equations_of(_moment(self.direction, (0.0, 0.0, 1.0)))

@@ -68,6 +68,11 @@ class Actuator(eqx.Module):
         return self.keys[key].unit
 
     @property
+    def factor(self) -> str:
+        """The key of a number to which its whole force is in proportion, 1 where the file gives none; or nothing."""
+        return "gain" if "gain" in self.keys else ""
+
+    @property
     def lifts(self) -> bool:
         """Whether its force is lift, which grows with the square of the speed."""
         return False
@@ -101,10 +106,11 @@ class Actuators(eqx.Module):
 
     items: tuple[Actuator, ...] = ()
 
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """Generalised force by equation (N, N m), of the motion's shape."""
+    def force(self, motion: Motion, name: str = "") -> dict[str, Signal]:
+        """Generalised force by equation (N, N m), of the motion's shape; of all, or of the actuator `name` alone."""
         beside = {item.name: item for item in self.items}
-        loads = [load for item in self.items for load in item.loads(motion, beside)]
+        own = [beside[name]] if name else self.items
+        loads = [load for item in own for load in item.loads(motion, beside)]
         if not loads:
             return {}
         lines = np.stack([line for _, line in loads])

@@ -27,7 +27,7 @@ class Fin(Actuator):
 
     - `position` m, `direction`: in which a positive deflection pushes.
     - `numbers`: `area` A m² and `lift_slope` 1/rad, or `derivative` s, N/(m/s)²/rad; `drag` $C_{D\delta\delta}$ 1/rad²,
-      with `area`.
+      with `area`; `gain` on both (1).
     - `inflow`: whether its own motion changes the angle of attack.
     """
 
@@ -40,6 +40,7 @@ class Fin(Actuator):
         "lift_slope": Number("1/rad"),
         "derivative": Number("N/(m/s)/(m/s)/rad"),
         "drag": Number("1/rad/rad"),
+        "gain": Number("1"),
         "inflow": Flag(),
     }
 
@@ -84,7 +85,7 @@ class Fin(Actuator):
         slope = self._slope(self.water(motion))
         found: list[Load] = [(slope * abs(ahead) * incidence, along)]
         if "drag" in self.numbers:
-            half = 0.5 * self.water(motion) * self.numbers["area"]
+            half = 0.5 * self.value("gain", 1.0) * self.water(motion) * self.numbers["area"]
             found.append((half * self.numbers["drag"] * (ahead * delta) ** 2, astern))
         return found
 
@@ -93,9 +94,10 @@ class Fin(Actuator):
         return [(self._slope(self.density) * abs(cruise), line(self.position, self.direction))] if self.inflow else []
 
     def _slope(self, density: Signal | float) -> Signal:
+        gain = self.value("gain", 1.0)
         if "derivative" in self.numbers:
-            return self.numbers["derivative"]
-        return 0.5 * density * self.numbers["area"] * self.numbers["lift_slope"]
+            return gain * self.numbers["derivative"]
+        return 0.5 * gain * density * self.numbers["area"] * self.numbers["lift_slope"]
 
 
 class Rudder(Actuator):
@@ -114,8 +116,8 @@ class Rudder(Actuator):
 
     - `position` m: of the rudder. `propeller`: an actuator of that kind, or none.
     - `numbers`: `area` m²; `lift_slope` $f_\alpha$ 1/rad, or `aspect_ratio` $\Lambda$ with
-      $f_\alpha = 6.13\Lambda/(\Lambda + 2.25)$; `t_R`, `a_H`, `x_H` m, `epsilon`, `kappa`, `eta`, `l_R` m, and
-      `gamma_R` with drift to port (brackets negative) and to starboard.
+      $f_\alpha = 6.13\Lambda/(\Lambda + 2.25)$; `gain` on $F_N$ (1); `t_R`, `a_H`, `x_H` m,
+      `epsilon`, `kappa`, `eta`, `l_R` m, and `gamma_R` with drift to port (brackets negative) and to starboard.
     """
 
     kind: ClassVar[str] = "rudder"
@@ -124,6 +126,7 @@ class Rudder(Actuator):
         "position": Vector("m", required=True),
         "propeller": Word(),
         "area": Number("m^2", required=True, positive=True),
+        "gain": Number("1"),
         "lift_slope": Number("1/rad"),
         "aspect_ratio": Number("1", positive=True),
         "t_R": Number("1"),
@@ -167,7 +170,8 @@ class Rudder(Actuator):
         delta, value = self.command(motion), self.value
         across, ahead = self._across(motion), self._ahead(motion, beside.get(self.propeller))
         angle = delta - jnp.arctan2(across, ahead + 1e-12)  # which has a slope at rest too
-        force = 0.5 * self.water(motion) * value("area") * self._slope() * (ahead**2 + across**2) * jnp.sin(angle)
+        strength = 0.5 * value("gain", 1.0) * self.water(motion) * value("area") * self._slope()
+        force = strength * (ahead**2 + across**2) * jnp.sin(angle)
         side, hull = force * jnp.cos(delta), 1.0 + value("a_H")
         x, _, z = self.position
         found = [

@@ -82,6 +82,11 @@ class Thruster(Actuator):
         return equations_of(line(self.position, self.direction))
 
     @property
+    def factor(self) -> str:
+        """The gain, on which what is lost by advance does not depend."""
+        return "" if self.follows else "gain"
+
+    @property
     def follows(self) -> bool:
         """With a loss of thrust by advance."""
         return "advance" in self.numbers
