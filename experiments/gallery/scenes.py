@@ -52,6 +52,7 @@ SCENES = (
     Scene("actuator-deadband", "r", "rudder", {"d": 0.08}),
     Scene("actuator-backlash", "r", "rudder", {"b": 0.06}),
     Scene("actuator-misalignment", "psi", "rudder"),
+    Scene("actuator-gain", "r", "rudder", {"gain": -0.3}),
     Scene("control-surface-stall", "r", "rudder", {"k": 3.0}),
     Scene("propeller-race", "r", "yaw,rudder"),
     Scene("propeller-torque", "phi"),
@@ -130,4 +131,5 @@ def facts(vehicle: AbstractVehicle, recording: Recording, shown: Mapping[str, np
         depth_range=(float(depth.min()), float(depth.max())),
         tones={} if rig else dict.fromkeys(layout.equations, (0.9,)),
         frequencies=1,
+        fixed_gains=tuple(commands),
     )

@@ -11,6 +11,10 @@ _RUNS = {
         "single steps of the actuator held for at least ten time constants, sampled five times as fast: a lag bends, a "
         "delay does not"
     ),
+    frozenset({"actuator-gain", "actuator-deadband", "actuator-backlash", "actuator-saturation"}): (
+        "steps of the actuator at a tenth, a third and all of its range: a gain takes the same share of each, a dead "
+        "band or play the same amount, a stop only the top"
+    ),
     frozenset({"quadratic-damping", "cubic-damping", "crossflow-drag"}): (
         "the same manoeuvre at a third and at three times the amplitude, and one with sway and yaw (or "
         "heave and pitch) in "

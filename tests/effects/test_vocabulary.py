@@ -77,7 +77,7 @@ def test_every_force_on_every_candidate_is_zero_at_amplitude_zero_and_linear_in_
         for part in sized(effect, np.zeros(count)).force(now).values():
             np.testing.assert_array_equal(part, 0.0)
         first, second, both = (sized(effect, s).force(now) for s in (one, two, one - 3.0 * two))
-        assert set(both) & {*effect.where} or effect.where[0].startswith("input:")
+        assert set(both) & set(effect.where) or effect.where[0].startswith("input:")
         for equation, part in both.items():
             np.testing.assert_allclose(part, first[equation] - 3.0 * second[equation], rtol=1e-10, atol=1e-10)
         assert all(np.abs(part).max() > 0.0 for part in both.values()), name((known, effect))
