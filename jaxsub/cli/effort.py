@@ -27,9 +27,9 @@ _READER, _READ = 0.3e9, 7
 _KEPT, _COMPILED = (1.8, 0.4), (4.8, 1.5)
 # s for each sample, state and column of the Jacobian in a pass
 _EACH = 1.2e-7
-# passes over the samples, and for each coefficient: those of a search, one for the statistics, two for what follows.
+# passes over the samples, and for each coefficient: those of a search, one for the statistics, three for what follows.
 # a search whose coefficients the runs hardly tell apart takes up to three times as many
-_PASSES, _OF_COEFFICIENT = 7, 0.65
+_PASSES, _OF_COEFFICIENT = 8, 0.65
 
 # s in which nothing is said of the time left, and between two lines, on a terminal and on a pipe; and the share of a
 # pass that tells how long the others will take

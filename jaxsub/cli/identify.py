@@ -101,10 +101,12 @@ def _followed(fitted: Identification, passes: Passes) -> Identification:
     """The fit and what follows from it, as far as it came before an interruption."""
     found, watch = fitted.fit, options().watch
     with suppress(KeyboardInterrupt):
-        coloured = interruptible(lambda: coloured_covariance(found, None, lambda share: passes(share, 2.0)), watch)
+        coloured = interruptible(
+            lambda: coloured_covariance(found, None, lambda share: passes(2.0 * share, 3.0)), watch
+        )
         fitted = dataclasses.replace(fitted, coloured=coloured)
-        second = lambda share: passes(1.0 + share, 2.0)
-        said = interruptible(lambda: identifiability(found, fitted.assessment, second), watch)
+        last = lambda share: passes(2.0 + share, 3.0)
+        said = interruptible(lambda: identifiability(found, fitted.assessment, last), watch)
         fitted = dataclasses.replace(fitted, said=said, complete=True)
     return fitted
 

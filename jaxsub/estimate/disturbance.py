@@ -8,6 +8,7 @@ residual and $V_iPe$ a pass back and one forth, so a step costs less than two gr
 quasi-Newton search needs a hundred.
 """
 
+import dataclasses
 from typing import NamedTuple
 
 import equinox as eqx
@@ -18,7 +19,7 @@ import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values, namespace
-from ..likelihood import Columns, Disturbance, System, covariance_derivatives, products, restricted
+from ..likelihood import Averages, Columns, Disturbance, System, covariance_derivatives, restricted, total_products
 from .damped import Damped
 from .problem import Expansion
 
@@ -37,8 +38,7 @@ _SIDE_BY_SIDE = 16
 
 
 class _Given(NamedTuple):
-    system: System
-    columns: Columns
+    parts: tuple[Averages, ...]
     prior: Array
     centre: Array
 
@@ -48,34 +48,36 @@ def estimate_disturbance(
     columns: Columns,
     prior: Float[Values, "p1 p1"],
     start: Disturbance,
-    *,
+    *averages: Averages,
     steps: int = _STEPS,
     rounds: int = 1,
 ) -> Disturbance:
     """The disturbance of largest restricted likelihood, or a better one than `start` where that is far from it.
 
-    The first of the `columns` is the residual; `prior` as for `restricted`. Priors hold it loosely to the `start`, and
-    its time constants below half the longest run. It takes at most so many `steps`, for which it is compiled, in each
-    of so many `rounds`; in `jit` only one.
+    The first of the `columns` is the residual; `prior` as for `restricted`. `averages` of the same columns, of runs too
+    long to be filtered sample by sample, are fitted beside them. Priors hold it loosely to the `start`, and its time
+    constants below half the longest run. It takes at most so many `steps`, for which it is compiled, in each of so many
+    `rounds`; in `jit` only one.
     """
     known = len(prior)
     whole = -(-known // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
     xp = namespace(prior)
     filled = xp.pad(prior, (0, whole - known)) + xp.diag(np.repeat([0.0, 1.0], [known, whole - known]))
-    found, columns = start, columns.padded(whole)
+    # samples are means of one each
+    one = xp.ones(())
+    parts = [dataclasses.replace(part, columns=part.columns.padded(whole)) for part in averages]
+    given = _Given((Averages(system, columns.padded(whole), one, one), *parts), filled, _logarithms(start))
+    found = start
     for left in reversed(range(rounds)):
-        found, done = _search(system, columns, filled, start, found, steps)
+        found, done = _search(given, found, steps)
         if left and bool(done):
             break
     return found
 
 
 @eqx.filter_jit
-def _search(
-    system: System, columns: Columns, prior: Array, centre: Disturbance, begin: Disturbance, steps: int
-) -> tuple[Disturbance, Bool[Array, ""]]:
-    """At most so many `steps` from `begin`, with priors about `centre`, and whether they arrived."""
-    given = _Given(system, columns, prior, _logarithms(centre))
+def _search(given: _Given, begin: Disturbance, steps: int) -> tuple[Disturbance, Bool[Array, ""]]:
+    """At most so many `steps` from `begin`, and whether they arrived."""
     solver = Damped(_expand, _ENOUGH, _FARTHEST)
     end = optx.minimise(_cost, solver, _logarithms(begin), given, max_steps=steps, throw=False)
     return _parts(given, end.value), end.result == optx.RESULTS.successful
@@ -86,15 +88,16 @@ def _logarithms(disturbance: Disturbance) -> Array:
 
 
 def _parts(given: _Given, y: Array) -> Disturbance:
-    n = given.system.G.shape[3] // 2
+    n = given.parts[0].system.G.shape[3] // 2
     return Disturbance(*jnp.split(jnp.exp(y), [n, 2 * n]))
 
 
 def _unlikely(y: Array, given: _Given) -> tuple[Array, Array]:
     """What the priors cost, and the diagonal of its curvature."""
-    n, c = given.system.G.shape[3] // 2, given.system.C.shape[2]
+    system = given.parts[0].system
+    n, c = system.G.shape[3] // 2, system.C.shape[2]
     each = lambda *values: jnp.repeat(jnp.asarray(values), jnp.asarray([n, n, c]), total_repeat_length=2 * n + c)
-    longest = jnp.max(jnp.sum(given.system.intervals, axis=-1))
+    longest = jnp.max(jnp.stack([jnp.max(jnp.sum(part.system.intervals, axis=-1)) for part in given.parts]))
     over = jnp.maximum(y - each(jnp.inf, jnp.log(_SLOWEST * longest), jnp.inf), 0.0) / _EDGE
     away = (y - given.centre) / each(*_LOOSE)
     return 0.5 * jnp.sum(away**2 + over**2), each(*_LOOSE) ** -2.0 + (over > 0.0) * _EDGE**-2.0
@@ -102,24 +105,44 @@ def _unlikely(y: Array, given: _Given) -> tuple[Array, Array]:
 
 @eqx.filter_jit
 def _cost(y: Array, given: _Given) -> Array:
-    return restricted(_parts(given, y), given.system, given.columns, given.prior) + _unlikely(y, given)[0]
+    return restricted(*_products(y, given)) + _unlikely(y, given)[0]
+
+
+def _products(y: Array, given: _Given) -> tuple[Array, Array]:
+    """Products of the whitened columns of all parts, the priors' included, and half the log-determinant."""
+    disturbance = _parts(given, y)
+    found = [total_products(part.resampled(disturbance), part.system, part.columns) for part in given.parts]
+    grams, spreads = zip(*found, strict=True)
+    return sum(grams, given.prior), sum(spreads, jnp.zeros(()))
 
 
 @eqx.filter_jit
 def _expand(given: _Given, y: Array) -> Expansion:
     """The cost to second order, with the average information for its curvature."""
-    system, columns, prior = given.system, given.columns, given.prior
 
-    def of(y: Array, residual: Array) -> Array:
-        shown = jnp.asarray(columns.shown).at[..., 0].set(residual)
-        return _cost(y, given._replace(columns=Columns(shown, columns.forcing)))
+    def of(y: Array, residuals: list[Array]) -> Array:
+        return _cost(y, given._replace(parts=tuple(map(_with_residual, given.parts, residuals))))
 
-    cost, (gradient, error) = jax.value_and_grad(of, argnums=(0, 1))(y, columns.shown[..., 0])
-    by = covariance_derivatives(_parts(given, y), system, error)
-    unforced = None if columns.forcing is None else jnp.zeros((*columns.forcing.shape[:-1], y.size), y.dtype)
-    bordered = jax.scipy.linalg.block_diag(prior, jnp.zeros((y.size, y.size), y.dtype))
-    gram, _ = products(_parts(given, y), system, columns + Columns(by, unforced), bordered)
-    known = len(prior)
+    residuals = [jnp.asarray(part.columns.shown)[..., 0] for part in given.parts]
+    cost, (gradient, errors) = jax.value_and_grad(of, argnums=(0, 1))(y, residuals)
+    parts = tuple(_with_derivatives(given, y, part, error) for part, error in zip(given.parts, errors, strict=True))
+    bordered = jax.scipy.linalg.block_diag(given.prior, jnp.zeros((y.size, y.size), y.dtype))
+    gram, _ = _products(y, given._replace(parts=parts, prior=bordered))
+    known = len(given.prior)
     fitted, across, own = gram[1:known, 1:known], gram[1:known, known:], gram[known:, known:]
     information = 0.5 * (own - across.T @ jnp.linalg.solve(fitted, across))
     return Expansion(cost, gradient, information + jnp.diag(_unlikely(y, given)[1]))
+
+
+def _with_residual(part: Averages, residual: Array) -> Averages:
+    shown = jnp.asarray(part.columns.shown).at[..., 0].set(residual)
+    return dataclasses.replace(part, columns=Columns(shown, part.columns.forcing))
+
+
+def _with_derivatives(given: _Given, y: Array, part: Averages, error: Array) -> Averages:
+    """With columns $V_iPe$ beside the others, of Pe the `error`."""
+    own = lambda y: _logarithms(part.resampled(_parts(given, y)))
+    by = covariance_derivatives(part.resampled(_parts(given, y)), part.system, error) @ jax.jacfwd(own)(y)
+    forcing = part.columns.forcing
+    unforced = None if forcing is None else jnp.zeros((*forcing.shape[:-1], y.size), y.dtype)
+    return dataclasses.replace(part, columns=part.columns + Columns(by, unforced))

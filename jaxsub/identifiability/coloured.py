@@ -11,35 +11,17 @@ nominal 95 % intervals then cover about 70 %. Here Γ is that of disturbance for
 Initial states are eliminated; priors count as observations of their own precision.
 """
 
-import dataclasses
 from typing import NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..estimate import Fit, Problem, estimate_disturbance
-from ..likelihood import (
-    Adjoint,
-    BlockLinearised,
-    Columns,
-    Disturbance,
-    Linearised,
-    System,
-    Watch,
-    carried_back,
-    carried_to_start,
-    first_guess,
-    nobody,
-    padded_width,
-)
+from ..estimate import Fit, Problem
+from ..likelihood import Adjoint, Disturbance, Linearised, System, Watch, carried_back, carried_to_start, nobody
 from ..recording.runs import Runs
-
-# samples that the disturbance of long runs is estimated from: its few numbers gain nothing from more; and of what a
-# filter carries along them, states and forces times columns, which its gradient keeps several times: 0.2 GB in all
-_WINDOWS, _LENGTH, _CARRIED = 8, 2500, 3_000_000
+from .residual_disturbance import Directions, residual_disturbance, whitened_columns
 
 
 class Coloured(eqx.Module):
@@ -65,33 +47,30 @@ def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None, watch:
     """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed.
 
     The `disturbance` is estimated from the residuals where none is given. Coefficients at a bound are held there.
-    `watch` is told the share of the samples that is done.
+    `watch` is told the share of both passes over the samples that is done.
     """
     problem, model = fit.problem, fit.model
     reduced = _reduced(problem, model.products, np.asarray(fit.pressed) != 0.0)
     if disturbance is None:
-        disturbance = _estimated(problem, *_windows(model), reduced)
+        disturbance = residual_disturbance(problem, model, reduced.directions, lambda share: watch(0.5 * share))
     adjoint = Adjoint.at_end(len(problem.guess), len(problem.spread), len(disturbance.force), len(fit.names))
     for index in reversed(range(len(model))):
         adjoint = _back(problem, *model[index], reduced, disturbance, adjoint)
-        watch(1.0 - index / len(model))
+        watch(1.0 - 0.5 * index / len(model))
     return Coloured(_sandwich(reduced, disturbance, adjoint), disturbance, fit.names)
 
 
 class _Reduced(NamedTuple):
     """A fit's directions of unit information.
 
-    `gain` (R, s, p) is how initial states follow the coefficients, `pinned` (p, p) what priors tell, `basis` and
-    `untold` (p, p) the directions that anything tells and the others, `prior` the products of the priors of the
-    residual and of the columns along the `basis`. `held` (p,) are at a bound.
+    `gain` (R, s, p) is how initial states follow the coefficients, `pinned` (p, p) what priors tell, `directions` those
+    that anything tells and `untold` (p, p) the others.
     """
 
     gain: Array
     pinned: Array
-    basis: Array
+    directions: Directions
     untold: Array
-    prior: Array
-    held: Array
 
 
 @eqx.filter_jit
@@ -116,16 +95,7 @@ def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array
     # a direction that nothing tells has an empty column, and must not make the matrix of the others singular
     empty = jnp.all(basis == 0.0, axis=0)
     prior = prior.at[1:, 1:].add(jnp.diag(jnp.where(empty, 1.0, 0.0)))
-    return _Reduced(gain, pinned, basis, untold, prior, held)
-
-
-@eqx.filter_jit
-def _estimated(problem: Problem, runs: Runs, model: Linearised, reduced: _Reduced) -> Disturbance:
-    """The disturbance of the residuals."""
-    theta, _, residual = _columns(problem, runs, model, reduced.held)
-    system = System.of(model, runs, problem.sigma, problem.spread)
-    columns = Columns(jnp.concatenate([residual[..., None], theta @ reduced.basis], axis=-1))
-    return estimate_disturbance(system, columns, reduced.prior, first_guess(system, residual))
+    return _Reduced(gain, pinned, Directions(held, basis, prior), untold)
 
 
 @eqx.filter_jit
@@ -138,51 +108,18 @@ def _back(
     after: Adjoint,
 ) -> Adjoint:
     """The adjoint recursion of the scores' covariance through one block."""
-    theta, start, _ = _columns(problem, runs, model, reduced.held)
+    theta, start, _ = whitened_columns(problem, runs, model)
     system = System.of(model, runs, problem.sigma, problem.spread)
-    left = theta - start @ reduced.gain[:, None]
+    left = jnp.where(reduced.directions.held, 0.0, theta) - start @ reduced.gain[:, None]
     return carried_back(disturbance, system, left, after)
 
 
 @eqx.filter_jit
 def _sandwich(reduced: _Reduced, disturbance: Disturbance, adjoint: Adjoint) -> Float[Array, "p p"]:
     """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
-    basis, untold = reduced.basis, reduced.untold
+    basis, untold = reduced.directions.basis, reduced.untold
     middle = basis.T @ (carried_to_start(disturbance, adjoint) + reduced.pinned) @ basis
     return basis @ middle @ basis.T + untold @ untold.T
-
-
-def _windows(model: BlockLinearised) -> tuple[Runs, Linearised]:
-    """All of it where that is one block, else windows of `_LENGTH` samples from where blocks begin."""
-    if model.only is not None:
-        return model.runs, model.only
-    count, samples = model.runs.times.shape
-    length, layout = min(samples, _LENGTH), model.vehicle.layout
-    carried = (len(layout.states) + len(layout.equations)) * padded_width(1 + len(layout.free))
-    windows = min(_WINDOWS, max(1, _CARRIED // (length * carried)))
-    chosen = np.linspace(0, count - 1, min(count, windows)).round().astype(int)
-    latest = (samples - length) // model.length
-    firsts = np.linspace(0, latest, min(latest + 1, max(1, windows // len(chosen)))).round().astype(int)
-    parts = [model.window(first, chosen, length) for first in firsts.tolist()]
-    arrays = ("times", "step_of", "live", "signals", "outputs", "mask")
-    whole = lambda *pieces: jnp.asarray(np.concatenate(pieces))
-    runs = dataclasses.replace(
-        parts[0][0], **{name: whole(*(getattr(part, name) for part, _ in parts)) for name in arrays}
-    )
-    return runs, jax.tree.map(whole, *(linearised for _, linearised in parts))
-
-
-def _columns(problem: Problem, runs: Runs, model: Linearised, held: Array) -> tuple[Array, Array, Array]:
-    """`whitened_columns`, those of coefficients at a bound empty."""
-    theta, start, residual = whitened_columns(problem, runs, model)
-    return jnp.where(held, 0.0, theta), start, residual
-
-
-def whitened_columns(problem: Problem, runs: Runs, model: Linearised) -> tuple[Array, Array, Array]:
-    """Whitened sensitivities to the coefficients (physical) and to the initial states (in their spreads); residuals."""
-    weight = runs.mask / problem.sigma
-    theta = model.theta * weight[..., None]
-    return theta, model.start * weight[..., None] * problem.spread, model.error / problem.sigma
 
 
 def _directions(information: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array, "p p"]]:

@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 from ..estimate import Fit, Problem
 from ..likelihood import BlockLinearised, Linearised, Watch, nobody
 from ..recording.runs import Runs
-from .coloured import whitened_columns
+from .residual_disturbance import whitened_columns
 
 FRACTION = 0.5
 # shares in a hidden direction below this are rounding

@@ -1,5 +1,6 @@
 """Likelihoods: how probable a recording is under a model, and how that changes with everything in it."""
 
+from .averages import Averages, group_means
 from .blocks import BlockLinearised, Watch, block_length, nobody, output_errors, summed_products
 from .disturbance import (
     Adjoint,
@@ -13,9 +14,9 @@ from .disturbance import (
     first_guess,
     padded_width,
     part_products,
-    products,
     restricted,
     smoothed,
+    total_products,
     whitened,
 )
 from .innovation_products import part_length
@@ -25,6 +26,7 @@ from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linear
 
 __all__ = [
     "Adjoint",
+    "Averages",
     "BlockLinearised",
     "Columns",
     "Disturbance",
@@ -43,6 +45,7 @@ __all__ = [
     "first_guess",
     "follow",
     "force_columns",
+    "group_means",
     "jacobians",
     "linearise",
     "negative_log_likelihood",
@@ -51,12 +54,12 @@ __all__ = [
     "padded_width",
     "part_length",
     "part_products",
-    "products",
     "propagate",
     "residual_outputs",
     "restricted",
     "smoothed",
     "summed_products",
+    "total_products",
     "value_and_columns",
     "whitened",
 ]

@@ -111,26 +111,15 @@ def first_guess(system: System, residual: Float[Array, "r k c"]) -> Disturbance:
     return Disturbance(force, jnp.full(n, slow), jnp.ones(residual.shape[2]))
 
 
-def restricted(
-    disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "p1 p1"]
-) -> Float[Array, ""]:
+def restricted(gram: Float[Array, "q q"], spread: Float[Array, ""]) -> Float[Array, ""]:
     """Minus the logarithm of the restricted likelihood, up to its constant.
 
-    The first of the `columns` is the residual, the others are fitted to it; `prior` is the Gram matrix of the residual
-    and columns of their priors.
+    `gram` (q, q) has the products of the whitened residual and of the columns that are fitted to it, those of their
+    priors included; `spread` is half the log-determinant of the residual's covariance.
     """
-    gram, spread = products(disturbance, system, columns, prior)
     among = jnp.linalg.cholesky(gram[1:, 1:])
     explained = solve_triangular(among, gram[1:, 0], lower=True)
     return spread + jnp.sum(jnp.log(jnp.diagonal(among))) + 0.5 * (gram[0, 0] - explained @ explained)
-
-
-def products(
-    disturbance: Disturbance, system: System, columns: Columns, prior: Float[Array, "q q"]
-) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
-    """Products of the whitened columns, the priors' included, and half the residuals' log-determinant."""
-    gram, spread = total_products(disturbance, system, columns)
-    return gram + prior, spread
 
 
 @eqx.filter_jit

@@ -15,7 +15,16 @@ from rigs import driven, oscillator, stacked
 
 from jaxsub.estimate import Ended, estimate_disturbance, evaluate
 from jaxsub.identifiability import coloured_covariance
-from jaxsub.likelihood import Columns, Disturbance, System, carried, covariance_derivatives, force_columns, restricted
+from jaxsub.likelihood import (
+    Columns,
+    Disturbance,
+    System,
+    carried,
+    covariance_derivatives,
+    force_columns,
+    restricted,
+    total_products,
+)
 from jaxsub.results import RESULTS
 from jaxsub.simulate import synthetic
 
@@ -144,6 +153,12 @@ def test_derivatives_of_the_covariance_are_those_of_the_dense_matrix(dense):
         np.testing.assert_allclose(column, expected, rtol=1e-6, atol=1e-8)
 
 
+def minus_log(disturbance, system, columns, prior):
+    """The restricted likelihood of one system's residual and columns."""
+    gram, spread = total_products(disturbance, system, columns)
+    return restricted(gram + prior, spread)
+
+
 def posed(fit, residual):
     """What `estimate_disturbance` takes but for its start, of residuals (R, K, c)."""
     system = System.of(fit.model.whole, fit.runs, fit.sigma, fit.problem.spread)
@@ -158,7 +173,7 @@ def test_scoring_ends_where_a_general_minimiser_of_the_same_likelihood_does(exac
     system, columns, prior = posed(exact, residuals[0])
     start = Disturbance(jnp.array([3.0]), jnp.array([10.0]), jnp.array([0.2, 5.0]))
     found = estimate_disturbance(system, columns, prior, start)
-    cost = jax.jit(lambda y: restricted(Disturbance(*jnp.split(jnp.exp(y), [1, 2])), system, columns, prior))
+    cost = jax.jit(lambda y: minus_log(Disturbance(*jnp.split(jnp.exp(y), [1, 2])), system, columns, prior))
     of = lambda disturbance: float(cost(np.log(np.concatenate(jax.tree.leaves(disturbance)))))
     best = scipy.optimize.minimize(cost, np.zeros(4), method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-3})
     assert of(start) > best.fun + 100.0
@@ -196,7 +211,7 @@ def test_restricted_likelihood_is_that_of_the_dense_covariance(dense):
     left = inverse - inverse @ theta @ np.linalg.solve(information, theta.T @ inverse)
     expected = 0.5 * (np.linalg.slogdet(total)[1] + np.linalg.slogdet(information)[1] + (e.T @ left @ e).item())
     columns = Columns(jnp.asarray(shown)[None], jnp.asarray(pushed)[None])
-    np.testing.assert_allclose(restricted(disturbance, data, columns, jnp.zeros((3, 3))), expected, rtol=1e-10)
+    np.testing.assert_allclose(minus_log(disturbance, data, columns, jnp.zeros((3, 3))), expected, rtol=1e-10)
 
 
 def test_coefficient_that_nothing_tells_keeps_an_error_without_bound_and_spoils_no_other(exact):
