@@ -15,6 +15,7 @@ _PATH = process.Location()
 METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
 STARTS = ("rest", "recorded", "estimated")
 KINDS = ("auv", "glider", "rov", "ship", "usv")
+PUBLISHED = ("bluerov2-heavy", "kvlcc2", "otter", "remus-100")
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
 _columns = click.option("--columns", type=_PATH, help="A TOML file that says which channels of a log to take.")
@@ -146,18 +147,28 @@ def simulate(vehicle: Path, run: Path, out: Path, start: Any, columns: Path | No
 
 
 @app.command()
-@click.argument("kind", type=click.Choice(KINDS))
+@click.argument("kind", type=click.Choice(KINDS), required=False)
 @dimensions
+@click.option("--like", type=click.Choice(PUBLISHED), help="A published vehicle in place of a kind.")
 @click.option("--log", type=_PATH, help="A recording whose columns are the inputs and outputs.")
 @_columns
 @_out()
 @_overwrite
 @common
-def init(kind: str, log: Path | None, columns: Path | None, out: Path | None, overwrite: bool, **sizes: Any) -> None:
+def init(
+    kind: str | None,
+    like: str | None,
+    log: Path | None,
+    columns: Path | None,
+    out: Path | None,
+    overwrite: bool,
+    **sizes: Any,
+) -> None:
     """Begin a vehicle file: coefficients estimated from dimensions, with their uncertainty and source."""
     from . import init as command
 
-    command.run(kind, {name: size for name, size in sizes.items() if size is not None}, log, columns, out, overwrite)
+    given = {name: size for name, size in sizes.items() if size is not None}
+    command.run(kind, like, given, log, columns, out, overwrite)
 
 
 @app.command("import")

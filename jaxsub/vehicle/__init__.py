@@ -6,7 +6,7 @@ from .build import build
 from .checks import require_inertia
 from .dimensions import check_units
 from .gazebo import read_sdf, sdf_text
-from .initial import InitialFile, initial_file
+from .initial import InitialFile, initial_file, published_file
 from .mechanism import Mechanism
 from .oddities import vehicle_findings
 from .read import read_vehicle, vehicle_from
@@ -24,6 +24,7 @@ __all__ = [
     "build",
     "check_units",
     "initial_file",
+    "published_file",
     "read_sdf",
     "read_vehicle",
     "require_inertia",

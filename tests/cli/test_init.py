@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from commands import ran
 
-from jaxsub.cli.app import KINDS
+from jaxsub.cli.app import KINDS, PUBLISHED
 from jaxsub.cli.quantity import DIMENSIONS
 from jaxsub.recording import Recording, save
 from jaxsub.vehicle import initial, read_vehicle
@@ -16,6 +16,7 @@ AUV = ("--length", "1.33m", "--diameter", "19.1 cm", "--mass", "30.5")
 
 def test_kinds_and_dimensions_are_those_of_the_vehicles():
     assert set(KINDS) == initial.KINDS.keys()
+    assert PUBLISHED == initial.PUBLISHED
     assert {name.replace("-", "_"): unit for name, (unit, _) in DIMENSIONS.items()} == initial.SIZES
 
 
@@ -25,7 +26,7 @@ def test_it_prints_or_writes_one_file(monkeypatch, capsys, tmp_path):
     assert code == 0 and "diameter = 0.191\n" in shown.out
     out = tmp_path / "auv.toml"
     code, said = ran(monkeypatch, capsys, "init", "auv", *AUV, "--out", out)
-    assert code == 0 and "18 coefficients; inputs propeller = thrust" in said.out
+    assert code == 0 and "22 free numbers; inputs propeller = thrust" in said.out
     assert out.read_text() == shown.out
     assert float(read_vehicle(out).values()["mass"]) == 30.5
     assert ran(monkeypatch, capsys, "init", "auv", *AUV, "--out", out)[0] == 2
@@ -53,6 +54,23 @@ def test_its_file_fits_its_log(monkeypatch, capsys, tmp_path):
     assert code == 0 and json.loads(said.out)["errors"] == 0
 
 
+def test_a_published_vehicle_is_begun_with_the_columns_of_a_log(monkeypatch, capsys, tmp_path):
+    """Claim: --like keeps the publication's numbers and comments, and takes inputs and outputs from the log."""
+    t = 0.1 * np.arange(50)
+    columns = {
+        name: np.sin(t + i) for i, name in enumerate(("t1", "t2", "t3", "t4", "t5", "t6", "t7", "port", "r", "v"))
+    }
+    save(Recording("run", t, columns, "run"), tmp_path / "run.csv", {"r": "deg/s"})
+    out = tmp_path / "rov.toml"
+    code, said = ran(
+        monkeypatch, capsys, "init", "--like", "bluerov2-heavy", "--log", tmp_path / "run.csv", "--out", out
+    )
+    assert code == 0 and "not used port" in said.out
+    text, vehicle = out.read_text(), read_vehicle(out)
+    assert "# Not in the log: t8." in text and "von Benzon" in text and "# 0.0134 m³ of fresh water" in text
+    assert vehicle.layout.channels == ("r", "v") and float(vehicle.values()["Y_v|v|"]) == -217.0
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
@@ -62,6 +80,7 @@ def test_its_file_fits_its_log(monkeypatch, capsys, tmp_path):
         (("--length", "3 furlong"), "unknown unit 'furlong'"),
         (("--length", "long"), "'long' is no number"),
         (("--length", "1", "--mass", "2"), "--diameter: is missing for an AUV"),
+        (("--like", "otter"), "--like: is given beside auv"),
     ],
 )
 def test_dimensions_that_cannot_be_are_bad_input(monkeypatch, capsys, given, said):

@@ -1,5 +1,6 @@
 """Vehicle files begun from dimensions: they read, move as vehicles do, and hold what is published of such vehicles."""
 
+import dataclasses
 import tomllib
 
 import jax.numpy as jnp
@@ -7,9 +8,12 @@ import numpy as np
 import pytest
 from rigs import stacked
 
+from jaxsub.checks import check
 from jaxsub.errors import InputError
+from jaxsub.estimate import fit
 from jaxsub.recording import Recording
-from jaxsub.simulate import integrate
+from jaxsub.simulate import integrate, synthetic
+from jaxsub.units import si_unit
 from jaxsub.vehicle import initial_file, vehicle_findings, vehicle_from
 
 # the REMUS 100, the Slocum, the BlueROV2 Heavy, the KVLCC2 as a 7 m model, the Otter
@@ -146,3 +150,45 @@ def test_dimensions_that_cannot_be_are_refused(kind, given, said):
 def test_a_log_without_a_channel_is_refused():
     with pytest.raises(InputError, match="has none of the channels u, v"):
         initial_file("auv", SIZES["auv"], log(battery=[3, 3, 3]))
+
+
+def driven_run(kind):
+    """What a vehicle of that kind records in half a minute of commands that change at random, each in its own way."""
+    vehicle, times = begun(kind), 0.1 * np.arange(300)
+    steps = np.random.default_rng(5)
+    columns = {}
+    for name, column in vehicle.layout.inputs:
+        ahead = 1.0 if name in ("propeller", "shaft_speed", "port", "starboard") else 0.0
+        signal = ahead + np.repeat(steps.choice([-0.3, 0.3] if ahead else [-1.0, 1.0], 20), 15)
+        columns[column] = 0.5 * COMMANDS[name] * signal
+    (made,) = synthetic(vehicle, [Recording(kind, times, columns, f"{kind}.csv")], seed=2)
+    units = {column: vehicle.layout.input_unit(name) for name, column in vehicle.layout.inputs}
+    return dataclasses.replace(made, units={column: si_unit(unit) for column, unit in units.items() if unit})
+
+
+@pytest.mark.parametrize("kind", SIZES)
+def test_its_own_log_is_taken_and_checked_without_a_warning(kind):
+    """Claim: every column of such a vehicle's log is used, and `check` has nothing to say against file and log."""
+    made = driven_run(kind)
+    file = initial_file(kind, SIZES[kind], made)
+    assert file.unused == []
+    vehicle = vehicle_from(tomllib.loads(file.text()), kind)
+    assert set(vehicle.layout.held) == set(begun(kind).layout.held)
+    findings = check(vehicle, [made]).findings
+    assert [one.line() for one in findings if one.severity != "note"] == []
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.long] if kind != "usv" else []) for kind in SIZES]
+)
+def test_a_fit_of_its_own_log_ends_near_the_truth(kind):
+    """Claim: begun half a standard deviation off, it ends within four of its standard errors."""
+    made, true = driven_run(kind), begun(kind).values()
+    vehicle = vehicle_from(tomllib.loads(initial_file(kind, SIZES[kind], made).text()), kind)
+    signs = np.random.default_rng(6).choice([-0.5, 0.5], len(vehicle.layout.free))
+    start = {
+        row.name: float(true[row.name]) + s * row.prior_std for row, s in zip(vehicle.layout.free, signs, strict=True)
+    }
+    found = fit(vehicle.with_values({name: jnp.asarray(value) for name, value in start.items()}), [made])
+    off = {n: abs(found.values[n] - float(true[n])) / found.standard_errors[n] for n in start}
+    assert max(off.values()) < 4.0, off

@@ -8,6 +8,7 @@ from .columns import Columns
 from .file import InitialFile
 from .floating import SHIP, USV, ship, usv
 from .glider import GLIDER, glider
+from .like import PUBLISHED, published_file
 from .rov import ROV, rov
 from .sizes import SIZES, Kind, Sizes
 
@@ -19,7 +20,7 @@ KINDS: dict[str, tuple[Kind, Callable[[Sizes, Columns], InitialFile]]] = {
     "usv": (USV, usv),
 }
 
-__all__ = ["KINDS", "SIZES", "InitialFile", "initial_file"]
+__all__ = ["KINDS", "PUBLISHED", "SIZES", "InitialFile", "initial_file", "published_file"]
 
 
 def initial_file(kind: str, given: Mapping[str, float], log: Recording | None = None) -> InitialFile:

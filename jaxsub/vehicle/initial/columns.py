@@ -52,15 +52,23 @@ class Columns:
         None in a log without such a column. `units` are SI, any where there are none; a unit that the log does not
         state is SI, unless it has to be `stated`.
         """
-        if self.log is None:
-            return None
         for name in self._left:
-            unit = self.log.units.get(name, "")
-            fits = not units or not (unit or stated) or unit in [si_unit(one) or "1" for one in units]
-            if fits and re.fullmatch(words, _plain(name)):
-                self._left.remove(name)
-                return Command(name, unit, self.log.columns[name])
+            if re.fullmatch(words, _plain(name)) and (found := self._command(name, units, stated)):
+                return found
         return None
+
+    def named(self, names: Sequence[str], units: Sequence[str]) -> Command | None:
+        """The first of the columns `names` that is left, as `take` has it."""
+        there = (self._command(name, units) for name in names if name in self._left)
+        return next((command for command in there if command), None)
+
+    def _command(self, name: str, units: Sequence[str], stated: bool = False) -> Command | None:
+        assert self.log is not None
+        unit = self.log.units.get(name, "")
+        if units and (unit or stated) and unit not in [si_unit(one) or "1" for one in units]:
+            return None
+        self._left.remove(name)
+        return Command(name, unit, self.log.columns[name])
 
     def outputs(self, moved: Sequence[str]) -> list[tuple[str, str]]:
         """Measured channels among those `moved`, each with its noise as TOML."""

@@ -16,10 +16,14 @@ def put_body(file: InitialFile, sizes: Sizes, inertia: tuple[float, float, float
     """`[body]` with the `inertia` (kg m²) from `source`, of a hull of that largest `width` (m)."""
     file.put("body", "mass", sizes.mass)
     file.put("body", "inertia", vector(*inertia), source)
-    file.put("body", "speed", sizes.speed, "usual speed, at which friction was estimated")
     file.put("body", "length", sizes.length)
     file.put("body", "diameter", width)
     file.put("body", "reference_density", sizes.density)
+
+
+def put_speed(file: InitialFile, sizes: Sizes) -> None:
+    """The speed about which a vehicle that goes ahead is looked at; one that hovers has none."""
+    file.put("body", "speed", sizes.speed, "usual speed, at which friction was estimated")
 
 
 def put_trim(file: InitialFile, sizes: Sizes, height: float) -> None:

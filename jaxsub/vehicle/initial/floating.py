@@ -6,7 +6,7 @@ import math
 from ...effects import GRAVITY
 from ..geometry import added_inertia_factors, added_mass_factors, crossflow_drag, friction_drag
 from .columns import Columns
-from .common import SURFACE, put_body, put_outputs
+from .common import SURFACE, put_body, put_outputs, put_speed
 from .file import Estimate, InitialFile, number, vector
 from .sizes import Kind, Sizes
 from .thrusters import numbered, put_thrusters, twin
@@ -103,6 +103,7 @@ def _begun(name: str, sizes: Sizes, hull: Hull, residual: float) -> InitialFile:
         f"radii of gyration 0.35 B and 0.25 L{', and of the hulls apart' if apart else ''}",
         sizes.beam,
     )
+    put_speed(file, sizes)
     file.put("model", "coriolis", '"rigid-body"')
     axes = (hull.length / 2.0, hull.beam / 2.0, hull.draught)
     (k1, k2, _), k3 = added_mass_factors(*axes), added_inertia_factors(*axes)[2]

@@ -9,7 +9,7 @@ from .slender import add_hull, add_water, put_slender
 
 GLIDER = Kind("a glider", ("diameter",), ("fin_span", "fin_chord"), speed=0.35)
 # of a wing by the length, and of the upright tail by the diameter, as the Slocum has them
-_WING, _TAIL = (0.27, 0.065, -0.05), (0.5, 0.6, -0.45)
+_WING, _TAIL = (0.27, 0.065, -0.1), (0.5, 0.7, -0.5)
 # part of the mass that moves, as the Slocum's battery does
 _MOVED = 0.2
 

@@ -10,7 +10,7 @@ from ..geometry import (
     friction_drag,
     hull_lift,
 )
-from .common import put_body, put_trim
+from .common import put_body, put_speed, put_trim
 from .file import Estimate, InitialFile
 from .fins import Fins
 from .sizes import Sizes
@@ -24,6 +24,7 @@ def put_slender(file: InitialFile, sizes: Sizes) -> None:
     sizes.require_room(math.pi / 4.0 * sizes.diameter**2 * sizes.length, "a cylinder")
     turned, rolled = sizes.mass * (0.25 * sizes.length) ** 2, sizes.mass * (0.35 * sizes.diameter) ** 2
     put_body(file, sizes, (rolled, turned, turned), "radii of gyration 0.35 d and 0.25 L", sizes.diameter)
+    put_speed(file, sizes)
     put_trim(file, sizes, sizes.diameter)
     file.put("model", "coriolis", '"full"')
 
