@@ -15,7 +15,7 @@ _DRIVES = {
 }  # fmt: skip
 
 
-def _lag(a, h, held):
+def lag(a, h, held):
     """The mean deflection over each step of T δ' = command - δ, exact for a constant command."""
     fade = jnp.exp(-h / a)
 
@@ -80,8 +80,8 @@ def _race(a, m):
 
 
 ACTUATORS = (
-    _on("rudder", "actuator-lag", _lag, 10.0, lambda a: {"T": a}),
-    _on("elevator_right", "actuator-lag", _lag, 10.0, lambda a: {"T": a}),
+    _on("rudder", "actuator-lag", lag, 10.0, lambda a: {"T": a}),
+    _on("elevator_right", "actuator-lag", lag, 10.0, lambda a: {"T": a}),
     _on("rudder", "actuator-delay", _delay, 5.0, lambda a: {"tau": a}),
     _on("rudder", "actuator-rate-limit", _rate_limit, 200.0, lambda a: {"R": 1.0 / a}),
     _on("rudder", "actuator-saturation", _saturation, 30.0, lambda a: {"limit": _stop(a)}),
@@ -90,7 +90,7 @@ ACTUATORS = (
     _on("rudder", "actuator-misalignment", lambda a, h, held: held + a, 0.3, lambda a: {"b": a}),
     _on("elevator_right", "actuator-misalignment", lambda a, h, held: held + a, 0.3, lambda a: {"b": a}),
     _on("rudder", "control-surface-stall", lambda a, h, held: held * (1.0 - a * held**2), 8.0, lambda a: {"k": a}),
-    _on("stern_plane", "actuator-lag", _lag, 10.0, lambda a: {"T": a}, vehicle="dsrv"),
+    _on("stern_plane", "actuator-lag", lag, 10.0, lambda a: {"T": a}, vehicle="dsrv"),
     _on("drive", "actuator-delay", _delay, 2.0, lambda a: {"tau": a}, vehicle="rig"),
     Truth("propeller-race", "rudder", "actuators", ("sway", "yaw"), 3e3, force=_race, lenient=("input:rudder",)),
 )

@@ -66,7 +66,8 @@ def generate(case: Case, folder: Path) -> dict:
     stated = sigma * STATED.get(case.noise, 1.0)
     errors = np.sqrt(np.nanmean(((measured - ideal)[-1] / stated) ** 2, axis=0))
     truth["floor"] = dict(zip(layout.channels, errors.tolist(), strict=True))
-    _write(folder, vehicle, None if case.condition == "estimated" else stated, measured, held, states, rng)
+    sigmas = [None] * len(sigma) if case.condition == "estimated" else stated.tolist()
+    write(folder, nearly(vehicle, sigmas, rng), measured, held, states)
     return truth
 
 
@@ -93,19 +94,20 @@ def _disturbance(vehicle: AbstractVehicle, drive: Drive, sigma: np.ndarray, rng:
     return small * COLOURED_SIGMAS / response
 
 
-def _write(
-    folder: Path, vehicle: AbstractVehicle, stated: np.ndarray | None, measured: np.ndarray, held: np.ndarray,
-    states: np.ndarray, rng: np.random.Generator,
-) -> None:  # fmt: skip
-    layout = vehicle.layout
-    sigma = [None] * len(layout.outputs) if stated is None else stated.tolist()
-    values = vehicle.values()
+def nearly(vehicle: AbstractVehicle, sigmas: Sequence[float | None], rng: np.random.Generator) -> AbstractVehicle:
+    """The vehicle as its owner knows it: every free number off by 10 to 20 %, and these `sigmas` of its channels."""
+    layout, values = vehicle.layout, vehicle.values()
     off = {p.name: rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.2) for p in layout.free}
     guess = vehicle.with_values({name: values[name] * (1.0 + share) for name, share in off.items()})
-    outs = tuple(dataclasses.replace(o, sigma=s) for o, s in zip(layout.outputs, sigma, strict=True))
-    guess = dataclasses.replace(guess, layout=dataclasses.replace(layout, outputs=outs))
+    outs = tuple(dataclasses.replace(o, sigma=s) for o, s in zip(layout.outputs, sigmas, strict=True))
+    return dataclasses.replace(guess, layout=dataclasses.replace(layout, outputs=outs))
+
+
+def write(folder: Path, file: AbstractVehicle, measured: np.ndarray, held: np.ndarray, states: np.ndarray) -> None:
+    """Write the vehicle `file` and a file a run: measured channels (R, K, c), commands (R, K, m), true states."""
+    layout = file.layout
     folder.mkdir(parents=True, exist_ok=True)
-    write_vehicle(guess, folder / "vehicle.toml")
+    write_vehicle(file, folder / "vehicle.toml")
     t = INTERVAL * np.arange(measured.shape[1])
     for run in range(len(measured)):
         columns = dict(zip(layout.channels, measured[run].T, strict=True))

@@ -30,6 +30,7 @@ def judge(folder: Path) -> dict:
         "verdict": found["verdict"],
         "physics": physics,
         "kinds": found["mismatch"]["kinds"],
+        "coefficients_p_value": found["mismatch"]["coefficients_p_value"],
         "where": [place["equation"] for place in found["mismatch"]["where"]],
         "held_out": found["fit"]["held_out"],
         "p_value": found["mismatch"]["p_value"],

@@ -13,7 +13,7 @@ def _sensor(name: str, channel: str, limit: float, shown, numbers=lambda a: {}, 
     )  # fmt: skip
 
 
-def _late(a, t, y):
+def late(a, t, y):
     return jnp.interp(t - a, t, y)
 
 
@@ -34,7 +34,7 @@ def _clipped(a, t, y):
 SENSORS = (
     *(_sensor("sensor-bias", c, 0.3, lambda a, t, y: y + a, lambda a: {"bias": a}) for c in ("r", "q", "v")),
     *(_sensor("sensor-scale", c, 0.9, lambda a, t, y: (1 + a) * y, lambda a: {"scale": a}) for c in ("r", "psi", "u")),
-    *(_sensor("sensor-delay", c, 10.0, _late, lambda a: {"tau": a}) for c in ("psi", "r")),
+    *(_sensor("sensor-delay", c, 10.0, late, lambda a: {"tau": a}) for c in ("psi", "r")),
     Truth("sensor-misalignment", "q,r", "sensors", ("sensor:q", "sensor:r"), 0.7, sense=_turned),
     Truth("sensor-lever-arm", "v,w", "sensors", ("sensor:v", "sensor:w"), 20.0, sense=_levered),
     _sensor("sensor-saturation", "r", 200.0, _clipped, lambda a: {"limit": 1.0 / a}),

@@ -15,7 +15,7 @@ def _push(m):
     return abs(n) * n / 3600.0
 
 
-def _over_ground(m):
+def over_ground(m):
     """Rows of the rotation from body to north, east, down: the first two."""
     phi, theta, psi = (m.positions[k] for k in ("phi", "theta", "psi"))
     s, c = jnp.sin, jnp.cos
@@ -31,7 +31,7 @@ _SET = (0.8, 0.6)
 
 def _current(a, m):
     """Drag on the velocity through the water: what a steady stream of `a` m/s takes from that over ground."""
-    north, east = _over_ground(m)
+    north, east = over_ground(m)
     stream = jnp.concatenate([a * (_SET[0] * north + _SET[1] * east), jnp.zeros(3)])
     names = ("surge", "sway", "heave", "roll", "pitch", "yaw")
     return dict(zip(names, -m.damping @ stream, strict=True))
@@ -57,7 +57,7 @@ def _suction(name: str, vehicle: str, clearance, scale: float, sign: float, limi
     return Truth(name, "heave", "environment", ("heave", "pitch"), limit, vehicle, force=force, numbers=numbers)
 
 
-def _tether(a, m):
+def tether(a, m):
     """A line from the surface, as long as the body is deep: drag in proportion to its length."""
     velocity = jnp.stack([m.rates[e] for e in ("surge", "sway", "heave")])
     drag = -a * m.positions["z"] * jnp.sqrt(velocity @ velocity + 1e-9) * velocity
@@ -98,6 +98,6 @@ SURROUNDINGS = (
     _wave("pitch", 0.6, 1e4),
     _suction("free-surface-suction", "nps-shallow", lambda m: m.positions["z"], 2.0, -1.0, 3e4),
     _suction("bottom-suction", "nps-altitude", lambda m: BOTTOM - m.positions["z"], 3.0, 1.0, 1e4),
-    Truth("tether-drag", "to the surface", "environment", ("surge", "sway", "heave"), 300.0, force=_tether,
+    Truth("tether-drag", "to the surface", "environment", ("surge", "sway", "heave"), 300.0, force=tether,
           numbers=lambda a: {"c": a}),
 )  # fmt: skip

@@ -1,7 +1,6 @@
 """One case from beginning to end: files made, judged, given to the peers; what came of it in one line."""
 
 import dataclasses
-import os
 import tempfile
 import traceback
 from pathlib import Path
@@ -12,13 +11,6 @@ from .generate import generate
 from .judge import judge
 from .peers import peers
 from .plan import Case
-
-
-def keep_to(*core: int) -> None:
-    """Keep a worker on a core of a number, if given: several that each use all of them wait for one another."""
-    for number in core:
-        cores = sorted(os.sched_getaffinity(0))
-        os.sched_setaffinity(0, {cores[number % len(cores)]})
 
 
 def work(case: Case) -> dict:

@@ -1,0 +1,1 @@
+"""Vehicles of the catalogue, each with one effect that its file leaves out."""
