@@ -20,8 +20,8 @@ _INSTEAD = {
     "rad": "degrees?", "rad/s": "degrees per second?", "m/s": "cm/s, mm/s or knots?", "m": "mm or cm?",
     "kg/m³": "g/cm³?", "K": "degrees Celsius?", "m/s/s": "mm/s² or counts?",
 }  # fmt: skip
-# shafts of small thrusters turn at thousands of revolutions a minute
-_QUANTITIES["shaft_speed"] = (-1e4, 1e4)
+# an input in rad/s is a shaft's, and those of small thrusters turn at thousands of revolutions a minute
+_SHAFT = (-1e4, 1e4)
 _FEW = 0.05  # of the samples: so many may be faults of the sensor, more are a wrong unit
 _STEP = (1e-6, 3600.0)  # s: sample intervals of any log of a run
 
@@ -31,7 +31,8 @@ def impossible(recording: Recording, channel: Channel, values: np.ndarray) -> tu
 
     A few of a measured channel are masked with a warning; more than 5 %, or any of an input, is an error.
     """
-    limits = _QUANTITIES.get(channel.quantity, _UNITS.get(channel.unit))
+    shaft = channel.role == "held input" and channel.unit == "rad/s"
+    limits = _SHAFT if shaft else _QUANTITIES.get(channel.quantity, _UNITS.get(channel.unit))
     if limits is None:
         return values, []
     with np.errstate(invalid="ignore"):
