@@ -25,7 +25,7 @@ def draw(results: dict, path: Path) -> None:
         axis.annotate(text, (max(before, after), row), (8, 0), textcoords="offset points", va="center", fontsize=8)
     axis.axvline(1.0, color="0.6", lw=1)
     axis.set_yticks(range(len(cases)), [f"{line['vehicle']}:\n{line['concealed']}" for line in cases], fontsize=8)
-    axis.set_ylim(len(cases) - 0.5, -0.5)
+    axis.set_ylim(max(len(cases), 1) - 0.5, -0.5)
     axis.set_xscale("log")
     axis.margins(x=0.35)
     axis.set_xlabel("largest rms residual of a channel on the test run, in σ")

@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,7 +13,7 @@ from experiments.concealed_physics.sensors import late
 from experiments.concealed_physics.surroundings import over_ground, tether
 from experiments.concealed_physics.truth import Truth
 from jaxsub.parameters import Parameter
-from jaxsub.vehicle import AbstractVehicle
+from jaxsub.vehicle import AbstractVehicle, SubmergedBody
 from jaxsub.vehicle.catalogue import kvlcc2
 
 
@@ -33,7 +34,7 @@ class Case:
     concealed: str
     truth: tuple[Truth, float] | None = None
     factors: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    file: Callable[[AbstractVehicle], AbstractVehicle] = lambda vehicle: vehicle
+    file: Callable[[Any], AbstractVehicle] = lambda vehicle: vehicle
 
 
 _NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
@@ -80,7 +81,7 @@ def _stream(ship: AbstractVehicle) -> Truth:
     return Truth("current", "steady", "environment", ship.layout.equations, math.inf, force=force)
 
 
-def _out_of_the_race(ship: AbstractVehicle) -> AbstractVehicle:
+def _out_of_the_race(ship: SubmergedBody) -> SubmergedBody:
     """KVLCC2 with a rudder in the ship's own speed, how strong it is left to the fit."""
     rudder = next(item for item in ship.actuators.items if item.name == "rudder")
     numbers = rudder.numbers | {"gain": jnp.asarray(0.7)}
