@@ -182,10 +182,12 @@ def test_what_is_not_translated_is_named(write):
     mesh = '<link name="dome"><collision name="c"><geometry><mesh/></geometry></collision><sensor name="imu"/></link>'
     text = model(more + mesh, TERMS | {"default_current": "0.1 0 0"})
     text = text.replace("<max_thrust_cmd>", "<deadband>1</deadband><max_thrust_cmd>")
+    text = text.replace("<uniform_fluid_density>", "<enable>tethys</enable><uniform_fluid_density>")
     _, lost = read_sdf(write(text))
     assert {
         "hydrodynamics: default_current", "plugin gz-sim-lift-drag-system (fin)", "include fins", "sensor imu",
         "collision dome/c: its volume is unknown", "thruster propeller_joint: deadband",
+        "buoyancy: enable",
     } <= set(lost)  # fmt: skip
     _, lost = sdf_text(remus_100_nonlinear())
     assert {"coefficients.X_0", "coefficients.Y_uu_delta_r", "inputs.rudder"} <= set(lost)

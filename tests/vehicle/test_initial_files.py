@@ -192,3 +192,25 @@ def test_a_fit_of_its_own_log_ends_near_the_truth(kind):
     found = fit(vehicle.with_values({name: jnp.asarray(value) for name, value in start.items()}), [made])
     off = {n: abs(found.values[n] - float(true[n])) / found.standard_errors[n] for n in start}
     assert max(off.values()) < 4.0, off
+
+
+def test_names_of_columns_cannot_break_the_file():
+    """Claim: columns with quotes or line breaks in their names are taken or listed, and the file reads."""
+    odd = {'rudder"': [0, 1, 0], "a\nb": [1, 2, 3], "yaw_rate": [0, 0, 0], "r": [0, 0, 0]}
+    file = initial_file("auv", SIZES["auv"], log(**odd))
+    vehicle = vehicle_from(tomllib.loads(file.text()), "auv")
+    assert dict(vehicle.layout.inputs) == {"rudder": 'rudder"'}
+    assert "'a\\nb'" in file.text() and "yaw_rate (name it r if it is)" in file.text()
+    assert set(file.unused) == odd.keys() - {'rudder"', "r"}
+
+
+@pytest.mark.parametrize(("count", "taken"), [(9, 8), (7, 6), (6, 6), (2, 2), (1, 0)])
+def test_an_rov_has_as_many_thrusters_as_its_log(count, taken):
+    """Claim: pulse widths are counted from 1500, all thrusters follow the first, and commands over are listed."""
+    widths = {f"motor_{i}_pwm": 1500.0 + 50.0 * np.arange(3) for i in range(1, count + 1)}
+    file = initial_file("rov", SIZES["rov"], log(**widths, r=[0, 0, 0]))
+    vehicle = vehicle_from(tomllib.loads(file.text()), "rov")
+    assert [item.name for item in vehicle.actuators.items] == [f"t{i}" for i in range(1, taken + 1)]
+    assert len(file.unused) == count - taken
+    assert {float(item.numbers["neutral"]) for item in vehicle.actuators.items} <= {1500.0}
+    assert sum(row.name.endswith(".forward") for row in vehicle.layout.free) == min(taken, 1)

@@ -16,6 +16,7 @@ from .terms import CORIOLIS, FLIP, symbol
 
 _GRAVITY, _DENSITY = 9.8, 1000.0  # of a world and of the buoyancy system that state none
 _LARGEST_THRUST = 1000.0  # N or rad/s, of a thruster that states none
+_PROPELLER = (("propeller_diameter", 0.02), ("fluid_density", 1000.0))  # and what they are where it states none
 _NO_MOTION = ("namespace", "link_name", "water_density", "waterDensity")
 _OF_THRUSTER = (
     "namespace", "topic", "joint_name", "thrust_coefficient", "propeller_diameter", "fluid_density", "use_angvel_cmd",
@@ -65,10 +66,8 @@ def _system(element: ET.Element, kind: str) -> ET.Element | None:
 
 def _is(plugin: ET.Element, kind: str) -> bool:
     """Whether a plugin is Gazebo's system of that kind, under its present name or that of Ignition."""
-    return (
-        re.fullmatch(rf"(?:lib)?(?:gz-sim\d*|ignition-gazebo\d*)-{kind}-system(?:\.so)?", plugin.get("filename", ""))
-        is not None
-    )
+    named = rf"(?:lib)?(?:gz-sim|ignition-gazebo)\d*-{kind}-system(?:\.so)?"
+    return re.fullmatch(named, plugin.get("filename", "")) is not None
 
 
 def _gravity(root: ET.Element, where: str) -> float:
@@ -87,11 +86,9 @@ def _density(root: ET.Element, where: str) -> float:
     if found is None:
         return _DENSITY
     graded = found.find("graded_buoyancy")
-    return (
-        number(found, "uniform_fluid_density", _DENSITY, where)
-        if graded is None
-        else number(graded, "default_density", _DENSITY, where)
-    )
+    if graded is not None:
+        return number(graded, "default_density", _DENSITY, where)
+    return number(found, "uniform_fluid_density", _DENSITY, where)
 
 
 def _body(model: Model, base: str, density: float, gravity: float, lost: list[str]) -> dict[str, Any]:
@@ -178,10 +175,8 @@ def _thrusters(model: Model, base: str, lost: list[str]) -> tuple[dict[str, Any]
         }
         turned = flag(plugin, "use_angvel_cmd")
         if turned:
-            disc = number(plugin, "propeller_diameter", 0.02, place) ** 4 * number(
-                plugin, "fluid_density", 1000.0, place
-            )
-            actuators[name]["forward"] = number(plugin, "thrust_coefficient", 1.0, place) * disc
+            diameter, water = (number(plugin, *of, place) for of in _PROPELLER)
+            actuators[name]["forward"] = number(plugin, "thrust_coefficient", 1.0, place) * water * diameter**4
         inputs[name] = {"column": name, "unit": "rad/s" if turned else "N"}
         kept = (*_OF_THRUSTER, *(() if turned else ("wake_fraction", "alpha_1", "alpha_2")))
         lost += [f"thruster {joint}: {one.tag}" for one in plugin if one.tag not in kept]
@@ -197,6 +192,8 @@ def _not_translated(root: ET.Element, model: ET.Element, plugin: ET.Element) -> 
         if one is not plugin and not any(_is(one, kind) for kind in kinds):
             target = one.findtext("link_name") or one.findtext("joint_name") or ""
             lost.append(f"plugin {one.get('filename') or one.get('name')}{f' ({target.strip()})' if target else ''}")
+        if _is(one, "buoyancy"):
+            lost += [f"buoyancy: {part.tag}" for part in one.iter() if part.tag in ("density_change", "enable")]
     lost += [f"joint {one.get('name')}: taken as fixed" for one in model.findall("joint") if one.get("type") != "fixed"]
     lost += [f"model {one.get('name')}" for one in root.iter("model") if one is not model]
     lost += [f"include {(one.findtext('uri') or '').strip()}" for one in root.iter("include")]

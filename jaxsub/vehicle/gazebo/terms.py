@@ -17,8 +17,8 @@ SIGNS = (1.0, -1.0, -1.0, 1.0, -1.0, -1.0)
 FLIP = np.diag(SIGNS[:3])
 _TAG = re.compile(r"([xyzkmn])(?:Dot([UVWPQR])|([UVWPQR])(abs)?([UVWPQR])?)")
 
-# Cν of the plugin with its sign, by the added masses a of the diagonal, negative by convention. All terms but X_vr have
-# the sign that is opposite to Fossen's -C_A(ν)ν, and N_uw stands for what is -a_v u v there
+# Cν of the plugin by the added mass of the diagonal. Signs are opposite to those of Fossen's -C_A(ν)ν but for X_vr, and
+# N_uw stands where he has Y_vdot u v
 CORIOLIS = {
     "X_wq": "-Z_wdot",
     "X_vr": "-Y_vdot",

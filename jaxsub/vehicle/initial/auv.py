@@ -1,6 +1,6 @@
 """A torpedo-shaped AUV: a body of revolution with a cruciform tail and a propeller."""
 
-from .columns import Columns
+from .columns import Columns, quoted
 from .common import SUBMERGED, put_outputs, put_thrust
 from .file import InitialFile
 from .fins import Fins
@@ -30,7 +30,7 @@ def auv(sizes: Sizes, columns: Columns) -> InitialFile:
     for name, (words, usual, direction) in _TAIL.items():
         command = columns.take(words, ["rad"])
         if columns.log is None or command:
-            file.put("inputs", name, f'"{command.column if command else usual}"', "rad")
+            file.put("inputs", name, quoted(command, usual), "rad")
             like = "rudder" if "rudder" in file.tables.get("actuators", {}) else ""
             file.put("actuators", name, fins.actuator(direction, like), "" if like else fins.slope.source)
         else:

@@ -1,7 +1,7 @@
 """Parts that the files of several kinds of vehicle have alike."""
 
 from ...effects import GRAVITY
-from .columns import Columns
+from .columns import Columns, quoted
 from .file import Estimate, InitialFile, vector
 from .sizes import Sizes
 
@@ -44,7 +44,7 @@ def put_thrust(file: InitialFile, columns: Columns, sizes: Sizes, drag: Estimate
     needed = drag.value * sizes.speed**2
     propeller = r"n|rpm|rps|shaft|shaft_speed|prop|propeller|propeller_speed|motor|thruster|throttle|thrust|force|t"
     if command := columns.take(propeller, ["rad/s"], stated=True):
-        file.put("inputs", "shaft_speed", f'"{command.column}"', "rad/s")
+        file.put("inputs", "shaft_speed", quoted(command, ""), "rad/s")
         file.add(Estimate.within(1.0, needed / command.largest**2, "drag at the usual speed by the largest n"), "X_nn")
         return
     command = columns.take(propeller, ["N"], stated=True) or columns.take(propeller, [])
@@ -68,4 +68,4 @@ def put_outputs(file: InitialFile, columns: Columns, moved: tuple[str, ...]) -> 
         file.put("outputs", f"{channel}.sigma", sigma)
     file.unused = columns.left
     if columns.left:
-        file.comments.append(f"Not used of the log: {', '.join(columns.left)}.")
+        file.comments.append(f"Not used of the log: {columns.said_of_left}.")

@@ -5,7 +5,7 @@ import math
 
 from ...effects import GRAVITY
 from ..geometry import added_inertia_factors, added_mass_factors, crossflow_drag, friction_drag
-from .columns import Columns
+from .columns import Columns, quoted
 from .common import SURFACE, put_body, put_outputs, put_speed
 from .file import Estimate, InitialFile, number, vector
 from .sizes import Kind, Sizes
@@ -43,7 +43,7 @@ def ship(sizes: Sizes, columns: Columns) -> InitialFile:
     shaft = columns.take("n|rpm|rps|shaft|shaft_speed|prop|propeller|propeller_speed", ["rad/s"], stated=True)
     wake = 0.5 * block - 0.05
     if columns.log is None or shaft:
-        file.put("inputs", "shaft_speed", f'"{shaft.column if shaft else "n"}"', "rad/s")
+        file.put("inputs", "shaft_speed", quoted(shaft, "n"), "rad/s")
         keys = f"position = {vector(-0.48 * sizes.length, 0.0, 0.0)}, diameter = {number(0.6 * sizes.draught)}"
         keys += f", K_T = [0.3, -0.28, -0.13], wake = {number(wake)}, thrust_deduction = {number(0.6 * wake)}"
         keys += f", gain = {Estimate(1.0, 0.3).toml(free=True)}"
@@ -54,7 +54,7 @@ def ship(sizes: Sizes, columns: Columns) -> InitialFile:
         file.add(Estimate.within(0.5, thrust, "thrust that keeps the usual speed: the log has none"), "X_0")
     command = columns.take(r"delta|delta_?r|rudder\w*|dr", ["rad"])
     if columns.log is None or command:
-        file.put("inputs", "rudder", f'"{command.column if command else "delta"}"', "rad, positive to starboard")
+        file.put("inputs", "rudder", quoted(command, "delta"), "rad, positive to starboard")
         area = sizes.length * sizes.draught / 100.0 * (1.0 + 50.0 * (block * sizes.beam / sizes.length) ** 2)
         keys = f"position = {vector(-0.5 * sizes.length, 0.0, 0.0)}, area = {number(area)}"
         keys += f", lift_slope = {Estimate(2.5, 0.8).toml(free=True)}, t_R = 0.35, a_H = 0.3"
@@ -78,7 +78,10 @@ def usv(sizes: Sizes, columns: Columns) -> InitialFile:
         columns.take("(?:.*_)?(?:left|port)(?:_.*)?", []),
         columns.take("(?:.*_)?(?:right|starboard|stbd)(?:_.*)?", []),
     )
-    commands = [side for side in sides if side is not None] if all(sides) else numbered(columns)[:2]
+    commands = [side for side in sides if side is not None]
+    if len(commands) < 2:
+        columns.put_back(commands)
+        commands = numbered(columns, (2,))
     if columns.log is None or len(commands) == 2:
         drag = -file.coefficients["X_u|u|"].value * sizes.speed**2
         box = (sizes.length, sizes.beam, sizes.draught)
@@ -90,19 +93,12 @@ def usv(sizes: Sizes, columns: Columns) -> InitialFile:
 def _begun(name: str, sizes: Sizes, hull: Hull, residual: float) -> InitialFile:
     """Body and hull, whose drag ahead is `residual` times its friction."""
     file = InitialFile(name, ("surge", "sway", "yaw"))
-    file.comments.append(
-        "Added mass turns with the body but for the Munk moment, which N_Uv holds, as in the MMG method."
-    )
+    file.comments.append("N_Uv holds the Munk moment, and X_vr the other Coriolis force of added mass (MMG method).")
     apart = (sizes.beam - hull.beam) / 2.0 if hull.count == 2 else 0.0
     turned = sizes.mass * ((0.25 * sizes.length) ** 2 + apart**2)
     rolled = sizes.mass * (0.35 * sizes.beam) ** 2
-    put_body(
-        file,
-        sizes,
-        (rolled, turned, turned),
-        f"radii of gyration 0.35 B and 0.25 L{', and of the hulls apart' if apart else ''}",
-        sizes.beam,
-    )
+    source = f"radii of gyration 0.35 B and 0.25 L{', and of the hulls apart' if apart else ''}"
+    put_body(file, sizes, (rolled, turned, turned), source, sizes.beam)
     put_speed(file, sizes)
     file.put("model", "coriolis", '"rigid-body"')
     axes = (hull.length / 2.0, hull.beam / 2.0, hull.draught)

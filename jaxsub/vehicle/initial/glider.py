@@ -1,6 +1,6 @@
 """A glider: a body of revolution with wings, a buoyancy engine and a mass that is moved to pitch it."""
 
-from .columns import Columns
+from .columns import Columns, quoted
 from .common import SUBMERGED, put_outputs
 from .file import Estimate, InitialFile, number, vector
 from .fins import Fins
@@ -30,7 +30,7 @@ def glider(sizes: Sizes, columns: Columns) -> InitialFile:
     _put_engine(file, columns, sizes)
     rudder = columns.take(r"delta_?r|rudder\w*|fin|dr", ["rad"])
     if columns.log is None or rudder:
-        file.put("inputs", "rudder", f'"{rudder.column if rudder else "delta_r"}"', "rad")
+        file.put("inputs", "rudder", quoted(rudder, "delta_r"), "rad")
         file.put("actuators", "rudder", tail.actuator((0.0, 1.0, 0.0)), tail.slope.source)
     else:
         tail.fix(file, upright=True)
@@ -44,14 +44,14 @@ def _put_engine(file: InitialFile, columns: Columns, sizes: Sizes) -> None:
     engine = columns.take(r"(?:\w*_)?(?:oil|ballast|vbd|engine|bladder|pump|buoyancy|piston)(?:_\w*)?", ["m^3", "kg"])
     if columns.log is None or engine:
         unit = "kg" if engine and engine.unit == "kg" else "m^3"
-        file.put("inputs", "engine", f'{{ column = "{engine.column if engine else "engine"}", unit = "{unit}" }}')
+        file.put("inputs", "engine", f'{{ column = {quoted(engine, "engine")}, unit = "{unit}" }}')
         of = f'of = "{"mass" if unit == "kg" else "volume"}", gain = {Estimate(1.0, 0.05).toml(free=True)}'
         file.put(
             "actuators", "engine", f'{{ kind = "ballast", position = {nose}, {of} }}', "in the nose, as the Slocum's"
         )
     moved = columns.take(r"(?:\w*_)?(?:batt?pos|battery|pitch_mass|moving_mass|mass|shifter)(?:_\w*)?", ["m"])
     if columns.log is None or moved:
-        file.put("inputs", "pitch_mass", f'{{ column = "{moved.column if moved else "pitch_mass"}", unit = "m" }}')
+        file.put("inputs", "pitch_mass", f'{{ column = {quoted(moved, "pitch_mass")}, unit = "m" }}')
         mass = Estimate.within(0.5, _MOVED * sizes.mass).toml(free=True)
         table = f'{{ kind = "moving-mass", direction = [1.0, 0.0, 0.0], mass = {mass} }}'
         file.put("actuators", "pitch_mass", table, f"{number(_MOVED)} of the mass, as the Slocum's battery")

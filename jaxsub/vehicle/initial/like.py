@@ -43,6 +43,6 @@ def published_file(name: str, log: Recording | None = None) -> tuple[str, list[s
     for channel, sigma in columns.outputs(layout.channels):
         outputs.add(tomlkit.key([channel, "sigma"]), tomlkit.value(sigma))
     file["outputs"] = outputs
-    said = [f"# Not used of the log: {', '.join(columns.left)}.\n"] if columns.left else []
+    said = [f"# Not used of the log: {columns.said_of_left}.\n"] if columns.left else []
     said += [f"# Not in the log: {', '.join(missing)}. Name their columns under [inputs].\n"] if missing else []
     return "".join([*said, tomlkit.dumps(file)]), columns.left

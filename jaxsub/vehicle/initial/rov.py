@@ -34,7 +34,7 @@ def rov(sizes: Sizes, columns: Columns) -> InitialFile:
     file.put("model", "coriolis", '"full"')
     _add_water(file, sizes, box)
     ahead = _add_drag(file, sizes, box)
-    commands = numbered(columns)
+    commands = numbered(columns, ARRANGEMENTS)
     count = len(commands) if columns.log else _USUAL
     if count:
         names = [f"t{index}" for index in range(1, count + 1)]

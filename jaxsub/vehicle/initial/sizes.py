@@ -16,7 +16,10 @@ SIZES: dict[str, str] = {
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """A kind of vehicle: the dimensions that it needs beside length and mass, and those that it may have."""
+    """A kind of vehicle: the dimensions that it needs beside length and mass, and those that it may have.
+
+    `speed` is the usual one in m/s, zero where that follows from the length.
+    """
 
     name: str
     needs: tuple[str, ...]

@@ -1,7 +1,7 @@
 """Thrusters of an ROV or a catamaran in the arrangements that are usual."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -45,13 +45,13 @@ ARRANGEMENTS: dict[int, Arrangement] = {
 }
 
 
-def numbered(columns: Columns) -> list[Command]:
-    """The commands of numbered thrusters in a log, as many as there is a usual arrangement for."""
+def numbered(columns: Columns, counts: Collection[int]) -> list[Command]:
+    """The commands of numbered thrusters in a log, as many as the largest of `counts` that there are."""
     found: list[Command] = []
     while command := columns.take(_WORDS, []):
         found.append(command)
-    count = max((n for n in ARRANGEMENTS if n <= len(found)), default=0)
-    columns.left.extend(command.column for command in found[count:])
+    count = max((n for n in counts if n <= len(found)), default=0)
+    columns.put_back(found[count:])
     return found[:count]
 
 
@@ -90,5 +90,5 @@ def _curve(command: Command | None, commands: Sequence[Command], largest: float,
 
 def _neutral(commands: Sequence[Command]) -> float:
     """The command that stands still: 1500 where all look like pulse widths in µs."""
-    widths = [float(np.nanmedian(command.values)) for command in commands]
-    return _NEUTRAL if all(1000.0 <= width <= 2000.0 for width in widths) else 0.0
+    pulses = all(command.there.size and 1000.0 <= float(np.median(command.there)) <= 2000.0 for command in commands)
+    return _NEUTRAL if pulses else 0.0
