@@ -214,3 +214,33 @@ def test_an_rov_has_as_many_thrusters_as_its_log(count, taken):
     assert len(file.unused) == count - taken
     assert {float(item.numbers["neutral"]) for item in vehicle.actuators.items} <= {1500.0}
     assert sum(row.name.endswith(".forward") for row in vehicle.layout.free) == min(taken, 1)
+
+
+@pytest.mark.parametrize("kind", SIZES)
+def test_any_dimensions_give_a_vehicle_that_is_damped(kind):
+    """Claim: from 10 cm to 300 m, slender or blunt, light or full, the file reads and motions are damped."""
+    draw = np.random.default_rng(8)
+    for _ in range(8):
+        length = 10.0 ** draw.uniform(-1.0, 2.5)
+        given = {"length": length, "density": draw.uniform(990.0, 1030.0), "speed": draw.uniform(0.1, 10.0)}
+        named = {name for name in SIZES[kind] if name not in ("mass", *given)}
+        given |= {name: length * draw.uniform(0.05, 0.9) for name in named}
+        sides = [given[name] for name in named] * (2 if "diameter" in named else 1)
+        given["mass"] = given["density"] * length * np.prod(sides) * draw.uniform(0.1, 0.75)
+        vehicle = vehicle_from(tomllib.loads(initial_file(kind, given).text()), kind)
+        values = {name: float(value) for name, value in vehicle.values().items()}
+        own = [
+            "X_u|u|",
+            "Y_v|v|",
+            "Z_w|w|",
+            "N_r|r|",
+            "Y_uv",
+            "Z_uw",
+            "Y_Uv",
+            "N_Ur",
+            "K_up",
+            "X_udot",
+            "Y_vdot",
+            "N_rdot",
+        ]
+        assert all(values[name] < 0.0 for name in own if name in values), (given, values)

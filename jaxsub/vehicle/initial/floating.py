@@ -129,6 +129,7 @@ def _add_clarke(file: InitialFile, density: float, hull: Hull) -> None:
         ("Y_Uv", 1.0 + 0.4 * fullness, 0.3),
         ("Y_Ur", (-0.5 + 2.2 * broad - 0.08 * wide) * length, 0.5),
         ("N_Uv", (0.5 + 2.4 * slender) * length, 0.3),
-        ("N_Ur", (0.25 + 0.039 * wide - 0.56 * broad) * length**2, 0.4),
+        # broader than the ships of the regression, a hull is damped all the same
+        ("N_Ur", max(0.25 + 0.039 * wide - 0.56 * broad, 0.1) * length**2, 0.4),
     ):
         file.add(Estimate.within(part, -unit * value, source), name)
