@@ -17,8 +17,8 @@ from ...parameters import number
 from ..restoring import STANDARD_DENSITY
 from .keys import Key
 
-# a size (N or N m), and the generalised force (6,) of one such in body axes
-Load = tuple[Signal, np.ndarray]
+# a size (N or N m), which is an array or a number of NumPy's, and the generalised force (6,) of one such in body axes
+Load = tuple[Any, np.ndarray]
 
 
 class Actuator(eqx.Module):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -93,7 +93,7 @@ class Fin(Actuator):
         """Of the lift by the velocity along the fin's direction."""
         return [(self._slope(self.density) * abs(cruise), line(self.position, self.direction))] if self.inflow else []
 
-    def _slope(self, density: Signal | float) -> Signal:
+    def _slope(self, density: Signal | float) -> Any:
         gain = self.value("gain", 1.0)
         if "derivative" in self.numbers:
             return gain * self.numbers["derivative"]
@@ -181,7 +181,7 @@ class Rudder(Actuator):
         ]
         return [(jnp.asarray(size), np.asarray(along)) for size, along in found]
 
-    def _slope(self) -> Signal:
+    def _slope(self) -> Any:
         if "lift_slope" in self.numbers:
             return self.numbers["lift_slope"]
         ratio = self.numbers["aspect_ratio"]
