@@ -206,26 +206,22 @@ class CandidateModels:
 def accept_jointly(models: CandidateModels, chosen: Sequence[int]) -> dict[int, Fits]:
     """As many of `chosen` as are accepted together, each as the best of its alternatives; empty if none is.
 
-    Each is left out that is not accepted beside the others. One that is left out wrongly is proposed again from the
-    model with the others.
+    All are fitted together first: with one of two alone, the coefficients absorb the other. Alternatives are fitted
+    only of a set that is accepted. Each effect is left out that is not accepted beside the others; one that is left out
+    wrongly is proposed again from the model with the others.
     """
-    while chosen:
-        kept = jointly_significant(models, chosen)
-        if not kept or not models.comparison([], [*kept]).accepted:
-            return {}
+    accepted = lambda numbers: models.comparison([], numbers).accepted
+    while (chosen := without_insignificant(models, chosen)) and accepted(chosen):
+        kept = best_alternatives(models, chosen)
         idle = next((i for i in reversed([*kept]) if not models.accepts([j for j in kept if j != i], i)), None)
         if idle is None:
-            return kept
+            return kept if accepted([*kept]) else {}
         chosen = [i for i in kept if i != idle]
     return {}
 
 
-def jointly_significant(models: CandidateModels, chosen: Sequence[int]) -> dict[int, Fits]:
-    """As many of `chosen` as are significant in one fit, each as the best of its alternatives.
-
-    All are fitted together first: with one of two alone, the coefficients absorb the other.
-    """
-    chosen = without_insignificant(models, chosen)
+def best_alternatives(models: CandidateModels, chosen: Sequence[int]) -> dict[int, Fits]:
+    """Each of `chosen` as the best of its alternatives beside the others."""
     kept: dict[int, Fits] = {}
     for place, index in enumerate(chosen):
         fits = models.alternatives([*kept, *chosen[place + 1 :]], index)
