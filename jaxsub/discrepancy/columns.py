@@ -30,6 +30,8 @@ from .view import View
 
 # by how much a shape such as a lag is moved to see which way the data would have it
 _NUDGE = 0.1
+# forces of which columns are made at once
+_AT_ONCE = 64
 
 
 def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple[Columns, list[list[int]]]:
@@ -45,27 +47,23 @@ def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple
     # forces come first
     free = {False: itertools.count(), True: itertools.count(len(forces))}
     owners = [[next(free[kind]) for _ in own] for own, kind in zip(made, shows, strict=True)]
-    return force_columns(view, forces) + output_columns(view, outputs), owners
+    return columns_of(view, forces, outputs), owners
 
 
-def force_columns(view: View, forces: Sequence[np.ndarray]) -> Columns:
-    """Columns of generalised forces given at both ends of each interval, (2, R, K-1, n) each."""
-    system = view.followed.system
-    if not forces:
-        return Columns(np.zeros((*system.C.shape[:3], 0)), np.zeros((*system.A.shape[:3], 0)))
-    begin, end = np.stack(forces, axis=-1)
-    forcing = np.asarray(system.G) @ np.concatenate([begin, end], axis=2)
-    return Columns(np.zeros((*system.C.shape[:3], len(forces))), forcing)
+def columns_of(view: View, forces: Sequence[np.ndarray], outputs: Sequence[np.ndarray] = ()) -> Columns:
+    """Columns of forces at both ends of each interval, (2, R, K-1, n), then of changes of the channels, (R, K, c), SI.
 
-
-def output_columns(view: View, outputs: Sequence[np.ndarray]) -> Columns:
-    """Columns of changes of the channels, (R, K, c) each, SI."""
-    system = view.followed.system
-    if not outputs:
-        return force_columns(view, [])
-    shown = np.stack(outputs, axis=-1) / np.asarray(view.sigma)[:, None]
-    shown = np.where(np.asarray(system.measured)[..., None], shown, 0.0)
-    return Columns(shown, np.zeros((*system.A.shape[:3], len(outputs))))
+    They are written where they stay, some at a time: copies of hundreds would take several times their memory.
+    """
+    system, count = view.followed.system, len(forces) + len(outputs)
+    shown, forcing = np.zeros((*system.C.shape[:3], count)), np.zeros((*system.A.shape[:3], count))
+    G, measured = np.asarray(system.G), np.asarray(system.measured)
+    for first in range(0, len(forces), _AT_ONCE):
+        begin, end = np.stack(forces[first : first + _AT_ONCE], axis=-1)
+        forcing[..., first : first + begin.shape[-1]] = G @ np.concatenate([begin, end], axis=2)
+    for i, change in enumerate(outputs, len(forces)):
+        shown[..., i] = np.where(measured, change / np.asarray(view.sigma), 0.0)
+    return Columns(shown, forcing)
 
 
 def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[np.ndarray]]:

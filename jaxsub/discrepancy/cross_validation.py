@@ -25,7 +25,7 @@ from ..arrays import quietly
 from ..estimate import Fit, Problem
 from .evidence import conditional
 from .settings import BLOCKS, BLOCKS_ONE_STEP, CLEAR_LOG_BAYES, LEVEL, SIGNIFICANCE
-from .view import View
+from .view import Parts, View
 
 
 class Predicted(NamedTuple):
@@ -113,14 +113,14 @@ def gain(before: Float[np.ndarray, " n"], after: Float[np.ndarray, " n"]) -> Gai
 
 def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     """`Predicted.one_step` of a view's vehicle under the view's disturbance."""
-    products, logarithms = view.products(view.base, view.disturbance, BLOCKS_ONE_STEP)
+    parts = view.products(view.base, view.disturbance, BLOCKS_ONE_STEP)
     # what lies beyond the end of a short run has nothing
     there = view.measured_by_part(BLOCKS_ONE_STEP) > 0
-    products, logarithms = products[there], logarithms[there]
-    gram = products.sum(axis=0) + np.asarray(view.prior)
+    parts = Parts(*(own[there] for own in parts))
+    gram = parts.products.sum(axis=0) + np.asarray(view.prior)
     if not np.all(np.isfinite(gram)):
-        return np.full(len(products), -np.inf)
-    return conditional(gram, products, logarithms)
+        return np.full(len(gram), -np.inf)
+    return conditional(gram, parts)
 
 
 @quietly

@@ -21,12 +21,13 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.linalg import block_diag
 
+from ..arrays import aligned_zeros
 from ..estimate import estimate_disturbance
-from ..likelihood import Columns, Disturbance, padded_width
-from .columns import force_columns
+from ..likelihood import Columns, Disturbance, padded_width, total_products
+from .columns import columns_of
 from .innovation_search import DISTURBANCE_STEPS, root_or_one
 from .settings import DISTURBANCE_SHARES, MOST_COLUMNS
-from .view import View
+from .view import Parts, View
 
 # rounds of scoring steps in which a disturbance is estimated
 _ROUNDS = 3
@@ -48,15 +49,13 @@ def integrated(gram: Float[np.ndarray, "q q"]) -> float:
     return -0.5 * float(squares + np.linalg.slogdet(gram[1:, 1:])[1])
 
 
-def conditional(
-    gram: Float[np.ndarray, "q q"], parts: Float[np.ndarray, "m q q"], spreads: Float[np.ndarray, " m"]
-) -> Float[np.ndarray, " m"]:
+def conditional(gram: Float[np.ndarray, "q q"], parts: Parts) -> Float[np.ndarray, " m"]:
     r"""Log density of each part of the recordings given the others, $\ln Z(H) - \ln Z(H - H_b) - \ln|L_b|$.
 
-    `gram` is H, the products of [r, J], priors included, `parts` are the $H_b$ without them, `spreads` the $\ln|L_b|$.
+    `gram` is H, the products of [r, J], priors included; `parts` have the $H_b$ without them and the $\ln|L_b|$.
     """
     whole = integrated(gram)
-    return np.array([whole - integrated(gram - part) for part in parts]) - spreads
+    return np.array([whole - integrated(gram - part) for part in parts.products]) - parts.log_determinants
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,29 +65,19 @@ class Products:
     **Fields**
 
     - `gram`: (1 + p + q, 1 + p + q): residual, free parameters, candidates; priors of the first 1 + p included.
-    - `parts`: (m, 1 + p + q, 1 + p + q) of it in m parts of the recordings, priors apart.
-    - `spreads`: (m,) half the log-determinant of the residuals' covariance, in parts. `samples`: how many.
+    - `log_determinant`: half that of the residuals' covariance. `samples`: how many. `known`: 1 + p.
     """
 
     disturbance: Disturbance
     gram: np.ndarray
-    spreads: np.ndarray
+    log_determinant: float
     samples: int
     known: int
-    parts: np.ndarray
-
-    def predicted(self, chosen: Sequence[int]) -> np.ndarray:
-        """(m,) log probability of each part of the recordings by the others, which leave every number some room.
-
-        At the estimates by the others, parameters that these hardly identify would count as wrong predictions.
-        """
-        at = np.ix_([0, *self._index(chosen)], [0, *self._index(chosen)])
-        return conditional(self._with_priors(chosen), self.parts[:, *at], self.spreads)
 
     def log_evidence(self, chosen: Sequence[int]) -> float:
         """Of the recordings with the candidate columns `chosen` in the model."""
         priors = 0.5 * len(chosen) * np.log(self.samples)
-        return float(integrated(self._with_priors(chosen)) - np.sum(self.spreads) - priors)
+        return float(integrated(self.with_priors(chosen)) - self.log_determinant - priors)
 
     def gains(self, chosen: Sequence[int], owners: Sequence[Sequence[int]]) -> Gains:
         """What each further candidate would add to `chosen`."""
@@ -113,32 +102,31 @@ class Products:
         left = self._left(chosen, more)
         return left[1:, 1:], left[1:, 0]
 
-    def mixed(self, chosen: Sequence[int], more: Sequence[int], weights: np.ndarray) -> "Products":
-        """With the candidate columns `chosen` and sums of `more`, their `weights` (len(more), m), for candidates."""
+    def sums(self, chosen: Sequence[int], more: Sequence[int], weights: np.ndarray) -> np.ndarray:
+        """The sums of columns that keep `chosen` and have for other candidates sums of `more`, by `weights` (_, m)."""
         kept = [0, *self._index(chosen)]
         whole = np.zeros((len(self.gram), len(kept) + weights.shape[1]))
         whole[kept, range(len(kept))] = 1.0
         whole[[self.known + c for c in more], len(kept) :] = weights
-        return self._of(whole, self.known)
+        return whole
+
+    def mixed(self, sums: np.ndarray, known: int) -> "Products":
+        """Of sums of the columns, the first `known` of which are of the residual and the free parameters."""
+        return dataclasses.replace(self, gram=sums.T @ self.gram @ sums, known=known)
 
     def seen_from(self, keep: np.ndarray) -> "Products":
         """With sums `keep` (1 + p, 1 + m) of the residual and the free parameters in the place of these."""
         candidates = len(self.gram) - self.known
-        return self._of(np.asarray(block_diag(keep, np.eye(candidates))), keep.shape[1])
+        return self.mixed(np.asarray(block_diag(keep, np.eye(candidates))), keep.shape[1])
 
     def scaled(self, length: np.ndarray) -> "Products":
         """With every column divided by its `length`."""
-        over = np.outer(length, length)
-        return dataclasses.replace(self, gram=self.gram / over, parts=self.parts / over)
-
-    def _of(self, sums: np.ndarray, known: int) -> "Products":
-        gram, parts = sums.T @ self.gram @ sums, sums.T @ self.parts @ sums
-        return dataclasses.replace(self, gram=gram, parts=parts, known=known)
+        return dataclasses.replace(self, gram=self.gram / np.outer(length, length))
 
     def weights(self, chosen: Sequence[int]) -> np.ndarray:
         """(1 + p + q,) of the columns whose sum is the residual less what parameters and `chosen` take up of it."""
         index, found = self._index(chosen), np.zeros(len(self.gram))
-        found[0], found[index] = 1.0, -np.linalg.solve(self._with_priors(chosen)[1:, 1:], self.gram[index, 0])
+        found[0], found[index] = 1.0, -np.linalg.solve(self.with_priors(chosen)[1:, 1:], self.gram[index, 0])
         return found
 
     def fall(self, chosen: Sequence[int]) -> float:
@@ -164,7 +152,7 @@ class Products:
         """Where the free parameters and the candidate columns `chosen` are."""
         return [*range(1, self.known), *(self.known + c for c in chosen)]
 
-    def _with_priors(self, chosen: Sequence[int]) -> Float[np.ndarray, "q q"]:
+    def with_priors(self, chosen: Sequence[int]) -> Float[np.ndarray, "q q"]:
         """Products of the residual, the free parameters and the `chosen` columns, with the priors of the latter."""
         index = [0, *self._index(chosen)]
         worth = np.repeat([0.0, 1.0 / self.samples], [self.known, len(chosen)])
@@ -177,7 +165,7 @@ class Products:
         """
         rest = [0, *(self.known + c for c in (range(len(self.gram) - self.known) if more is None else more))]
         mixed = self.gram[np.ix_(self._index(chosen), rest)]
-        return self.gram[np.ix_(rest, rest)] - mixed.T @ np.linalg.solve(self._with_priors(chosen)[1:, 1:], mixed)
+        return self.gram[np.ix_(rest, rest)] - mixed.T @ np.linalg.solve(self.with_priors(chosen)[1:, 1:], mixed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -216,13 +204,23 @@ class Evidence:
 
     def under(self, disturbance: Disturbance) -> Products:
         """The products under a disturbance."""
-        view, unit = self.view, self._unit
-        parts, spreads = view.products(self.whole, disturbance)
-        parts = parts[:, : len(unit), : len(unit)] / np.outer(unit, unit)
-        gram, known = parts.sum(axis=0), len(view.prior)
-        gram[:known, :known] += view.prior
-        samples = int(np.sum(np.asarray(view.followed.system.measured)))
-        return Products(disturbance, gram, spreads, samples, known, parts)
+        system, prior, unit = self.view.followed.system, self.view.prior, self._unit
+        found, log_determinant = total_products(disturbance, system, self.whole)
+        gram = np.asarray(found)[: len(unit), : len(unit)] / np.outer(unit, unit)
+        gram[: len(prior), : len(prior)] += prior
+        samples = int(np.sum(np.asarray(system.measured)))
+        return Products(disturbance, gram, float(log_determinant), samples, len(prior))
+
+    def parts(self, chosen: Sequence[int], disturbance: Disturbance) -> Parts:
+        """Products of the residual, the free parameters and the candidate columns `chosen` by part, priors apart."""
+        return self.view.products(self.view.base + self.picked(chosen), disturbance)
+
+    def predicted(self, chosen: Sequence[int], products: Products) -> Float[np.ndarray, " m"]:
+        """Log probability of each part of the recordings by the others, which leave every number some room.
+
+        At the estimates by the others, parameters that these hardly identify would count as wrong predictions.
+        """
+        return conditional(products.with_priors(chosen), self.parts(chosen, products.disturbance))
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Evidence":
         """Of a view along the same path whose residual and free parameters are sums `keep` (1 + p, 1 + m) of these."""
@@ -266,7 +264,7 @@ def _placed(base: Columns, candidates: Columns) -> Columns:
     known, count = base.shown.shape[-1], candidates.shown.shape[-1]
 
     def beside(own: np.ndarray, more: np.ndarray) -> Array:
-        whole = np.zeros((*own.shape[:-1], padded_width(known + count)))
+        whole = aligned_zeros((*own.shape[:-1], padded_width(known + count)))
         whole[..., :known], whole[..., known : known + count] = own, more
         return jax.device_put(whole)
 
@@ -275,5 +273,5 @@ def _placed(base: Columns, candidates: Columns) -> Columns:
 
 def evidence_of(view: View) -> float:
     """Log evidence of a view's own model, each free number's prior worth one sample."""
-    products = Evidence.of(view, force_columns(view, []), [view.disturbance]).products[0]
+    products = Evidence.of(view, columns_of(view, []), [view.disturbance]).products[0]
     return float(products.log_evidence([]) - 0.5 * (products.known - 1) * np.log(products.samples))

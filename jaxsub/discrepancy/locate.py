@@ -13,7 +13,7 @@ import numpy as np
 from ..effects import AbstractEffect, AbstractInstrument, Motion, by_name, velocities
 from ..likelihood import Disturbance
 from ..recording import Recording
-from .columns import differences, force_columns, output_columns
+from .columns import columns_of, differences
 from .diagnosis import ForceTrace, Location, Regime
 from .evidence import Evidence
 from .process_noise import NoiseSignal
@@ -89,7 +89,7 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
             pushed.append((effect.where[0], whole))
         else:
             pushed += [(e, whole * (np.arange(len(equations)) == i)) for i, e in enumerate(equations)]
-    columns = force_columns(view, [c for _, c in pushed]) + output_columns(view, [c for _, c in shown])
+    columns = columns_of(view, [c for _, c in pushed], [c for _, c in shown])
     evidence = Evidence.of(view, columns, [disturbance])
     left = evidence.products[0].unabsorbed() * evidence.length**2
     found: dict[str, float] = {}
@@ -167,7 +167,7 @@ def grows_with(view: View, equation: str) -> list[str]:
     equations = view.vehicle.layout.equations
     own = np.eye(len(equations))[equations.index(equation)]
     pushed = [np.stack([motion[name] for motion in (starts, ends)])[..., None] * own for name in names]
-    evidence = Evidence.of(view, force_columns(view, pushed), [view.disturbance])
+    evidence = Evidence.of(view, columns_of(view, pushed), [view.disturbance])
     gain = evidence.products[0].gains([], [[i] for i in range(len(names))]).statistic
     ranked = np.argsort(-gain)[:GROWTH_VARIABLES]
     return [names[i] for i in ranked if gain[i] > GROWTH_RATIO * gain[ranked[0]] and gain[i] > GROWTH_SCORE]

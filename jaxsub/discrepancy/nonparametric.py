@@ -13,8 +13,8 @@ from scipy import special
 
 from ..effects import KNOTS, SmoothForce, with_numbers
 from ..likelihood import Disturbance, smoothed
-from .columns import force_columns
-from .evidence import Evidence, Products
+from .columns import columns_of
+from .evidence import Evidence, Products, conditional
 from .settings import FORCE_DISTURBANCE_SHARES, LENGTH_SCALES, MAJORITY, SIGNIFICANCE
 from .smoothness import FINE, Smooth, coarse, smoothest
 from .spline_basis import basis_forces, promising_forces, smooth_forces
@@ -104,8 +104,9 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     ]
     # one force after the other: products between forces are not needed
     picked = chosen.picked(columns)
-    of = lambda force: Evidence.of(view, picked + force_columns(view, basis_forces(view, force, FINE)), asked)
-    every = [_Weighed(found.products, found.length[len(columns) :], len(columns)) for found in map(of, weighed)]
+    of = lambda force, asked: Evidence.of(view, picked + columns_of(view, basis_forces(view, force, FINE)), asked)
+    made = (of(force, asked) for force in weighed)
+    every = [_Weighed(found.products, found.length[len(columns) :], len(columns)) for found in made]
     values = [each.values(each.held) for each in every]
     best = int(np.argmax([np.max(each) for each in values]))
     found, at = every[best], int(np.argmax(values[best]))
@@ -116,7 +117,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     heights, size, explained = found.heights(at)
     force = dataclasses.replace(weighed[best], spread=float(f"{size:.6g}"))
     force, near = found.nearest(at, force, heights)
-    return Pattern(force, heights, near, p_value, found.predicts(), alone, explained)
+    return Pattern(force, heights, near, p_value, found.predicts(of(weighed[best], asked[:1])), alone, explained)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,19 +153,33 @@ class _Weighed:
         gain = lambda p: smoothest(p, held, self.own, self.length).gain
         return np.array([p.log_evidence(held) + gain(p) for p in self.products])
 
-    def together(self, products: Products) -> tuple[Products, Smooth]:
-        """Products of the chosen columns and of those of the force's prior, and the smooth function."""
+    def together(self, products: Products) -> tuple[Products, np.ndarray, Smooth]:
+        """Products of the chosen columns and of those of the force's prior, the sums they are of, and the function."""
         smooth = smoothest(products, self.held, self.own, self.length)
-        return products.mixed(self.held, self.own, smooth.weights), smooth
+        sums = products.sums(self.held, self.own, smooth.weights)
+        return products.mixed(sums, products.known), sums, smooth
 
-    def predicts(self) -> bool:
-        """Whether the force improves the prediction of parts of the recordings, under the best disturbance of each."""
-        with_it = max(float(np.sum(self.together(p)[0].predicted([*self.held, *self.own]))) for p in self.products)
-        return with_it > max(float(np.sum(p.predicted(self.held))) for p in self.products)
+    def predicts(self, evidence: Evidence) -> bool:
+        """Whether the force improves the prediction of parts of the recordings, under the best disturbance of each.
+
+        `evidence` has the columns that the products are of: those of all forces would take much memory.
+        """
+        with_it, without = zip(*(self._predicted(products, evidence) for products in self.products), strict=True)
+        return max(with_it) > max(without)
+
+    def _predicted(self, products: Products, evidence: Evidence) -> tuple[float, float]:
+        """Log probability of the parts of the recordings by each other, with and without the force."""
+        both, sums, _ = self.together(products)
+        parts = evidence.parts([*self.held, *self.own], products.disturbance)
+        mixed = parts._replace(products=sums.T @ parts.products @ sums)
+        few = products.known + self.count
+        fewer = parts._replace(products=parts.products[:, :few, :few])
+        with_it = conditional(both.with_priors([*self.held, *self.own]), mixed)
+        return float(np.sum(with_it)), float(np.sum(conditional(products.with_priors(self.held), fewer)))
 
     def heights(self, at: int) -> tuple[np.ndarray, float, float]:
         """The force at the knots, its prior standard deviation, and the share explained by the chosen columns."""
-        both, smooth = self.together(self.products[at])
+        both, _, smooth = self.together(self.products[at])
         gains = both.gains(self.held, [self.own])
         fall = both.fall(self.held)
         explained = fall / max(fall + float(gains.statistic[0]), 1e-300)
@@ -189,7 +204,7 @@ def most_explained(view: View, disturbance: Disturbance) -> float:
     forces = smooth_forces(view)
     if not forces:
         return 0.0
-    drawn = force_columns(view, [column for force in forces for column in basis_forces(view, force, KNOTS)])
+    drawn = columns_of(view, [column for force in forces for column in basis_forces(view, force, KNOTS)])
     products = Evidence.of(view, drawn, [disturbance]).products[0]
     return float(np.max(products.explained([], _owners(forces, 0, KNOTS))))
 

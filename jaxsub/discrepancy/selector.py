@@ -223,7 +223,8 @@ class Selector:
         before, after = self.columns(chosen), self.columns([*chosen, more])
         free = more in self.freely
         without, with_it = (self.free if free else self.evidence.best(columns)[1] for columns in (before, after))
-        return bool(np.sum(with_it.predicted(after)) > np.sum(without.predicted(before)))
+        predicted = lambda columns, products: float(np.sum(self.evidence.predicted(columns, products)))
+        return predicted(after, with_it) > predicted(before, without)
 
     def p_value(self, index: int, scan: Scan) -> float:
         """Of a candidate's χ², family-wise: the probability of so small a smallest p-value of all under the null."""

@@ -12,7 +12,7 @@ import dataclasses
 import numpy as np
 
 from ..effects import Facts
-from .columns import force_columns
+from .columns import columns_of
 from .evidence import Evidence, Products
 from .settings import TONE_SCORE
 from .view import View
@@ -51,7 +51,7 @@ def _looked(view: View, equations: list[str], omega: np.ndarray, middle: float) 
         cos, sin = np.cos(tone * times), np.sin(tone * times)
         late = times - middle
         forces += [signal[..., None] * own for signal in (cos, sin, late * sin, late * cos)]
-    evidence = Evidence.of(view, force_columns(view, forces))
+    evidence = Evidence.of(view, columns_of(view, forces))
     looks = [_of(products, evidence.length, len(omega)) for products in evidence.products]
     value, step = (np.stack(parts) for parts in zip(*looks, strict=True))
     first = np.argmax(value, axis=0), np.arange(len(omega))

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -37,6 +38,13 @@ _QUIET = 1e-2
 _LEAST_WHITE = 1e-5
 
 
+class Parts(NamedTuple):
+    """Of m parts of the recordings: products of whitened columns, and half the log-determinants of covariances."""
+
+    products: Float[np.ndarray, "m q q"]
+    log_determinants: Float[np.ndarray, " m"]
+
+
 @dataclasses.dataclass(frozen=True)
 class View:
     """A model linearised about its filtered trajectory.
@@ -66,16 +74,15 @@ class View:
         """Whether the filter passed over all of the recordings without divergence."""
         return bool(np.all(np.isfinite(self.covariance)))
 
-    def products(
-        self, columns: Columns, disturbance: Disturbance, pieces: int | None = None
-    ) -> tuple[Float[np.ndarray, "m q q"], Float[np.ndarray, " m"]]:
-        """Products of `columns` whitened under a disturbance, in m parts of the recordings, and half the
-        log-determinant of each part's covariance. Every run is cut into so many `pieces`, or so that there are four.
+    def products(self, columns: Columns, disturbance: Disturbance, pieces: int | None = None) -> Parts:
+        """Products of `columns` whitened under a disturbance, in parts of the recordings.
+
+        Every run is cut into so many `pieces`, or so that there are at least four parts.
         """
         system = self.followed.system
         pieces = pieces or max(1, -(-BLOCKS // len(system.measured)))
         found, spreads = part_products(disturbance, system, columns, pieces)
-        return found.reshape(-1, *found.shape[2:]), spreads.reshape(-1)
+        return Parts(found.reshape(-1, *found.shape[2:]), spreads.reshape(-1))
 
     def measured_by_part(self, pieces: int) -> Int[np.ndarray, " m"]:
         """How many values were measured in each part that `products` makes of the recordings."""
@@ -191,7 +198,7 @@ def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndar
 
 def _left(view: View) -> Columns:
     """The innovations less their projection on the free parameters."""
-    gram = np.sum(view.products(view.base, view.disturbance)[0], axis=0) + view.prior
+    gram = np.sum(view.products(view.base, view.disturbance).products, axis=0) + view.prior
     weights = np.array([1.0, *-np.linalg.solve(gram[1:, 1:], gram[1:, 0])])
     return jax.tree.map(lambda column: (column @ weights)[..., None], view.base)
 

@@ -9,11 +9,12 @@ import pytest
 
 from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter, proposed_effects
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
-from jaxsub.discrepancy.evidence import Products
+from jaxsub.discrepancy.evidence import Products, conditional
 from jaxsub.discrepancy.name import Named
 from jaxsub.discrepancy.selector import Scan, Selector
 from jaxsub.discrepancy.structure_search import without_redundant
 from jaxsub.discrepancy.verdict import Judged
+from jaxsub.discrepancy.view import Parts
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.likelihood import Disturbance
 
@@ -75,13 +76,19 @@ def in_four_parts(columns):
 
     Where the effect is left out a disturbance stands for it, of a variance that is 1.5 of the noise's.
     """
-    parts = np.stack([w.T @ w for w in np.split(np.column_stack(columns), 4)])
+    bare = Parts(np.stack([w.T @ w for w in np.split(np.column_stack(columns), 4)]), np.zeros(4))
+    wide = Parts(bare.products / 1.5, np.full(4, 25.0 * np.log(1.5)))
     still = Disturbance(*jnp.ones((3, 1)))
-    wide = Products(still, parts.sum(axis=0) / 1.5, np.full(4, 25.0 * np.log(1.5)), 200, 2, parts / 1.5)
-    bare = Products(still, parts.sum(axis=0), np.zeros(4), 200, 2, parts)
+    whole = lambda parts: Products(still, parts.products.sum(axis=0), float(parts.log_determinants.sum()), 200, 2)
+    at = lambda parts, count: parts._replace(products=parts.products[:, :count, :count])
     asked = object.__new__(Selector)
     asked.owners, asked.freely = [[0]], set()
-    asked.evidence = SimpleNamespace(best=lambda columns: (0.0, bare if columns else wide))
+    asked.evidence = SimpleNamespace(
+        best=lambda columns: (0.0, whole(bare if columns else wide)),
+        predicted=lambda columns, products: conditional(
+            products.with_priors(columns), at(bare if columns else wide, 2 + len(columns))
+        ),
+    )
     return asked
 
 

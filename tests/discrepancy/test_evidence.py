@@ -11,12 +11,12 @@ from jax import Array
 from scipy import stats
 
 from jaxsub.discrepancy.columns import candidate_columns, plausible, sensor_changes
-from jaxsub.discrepancy.evidence import Evidence, Products, evidence_of
+from jaxsub.discrepancy.evidence import Evidence, Products, conditional, evidence_of
 from jaxsub.discrepancy.locate import effect_shares
 from jaxsub.discrepancy.model import is_admissible
 from jaxsub.discrepancy.name import select
 from jaxsub.discrepancy.selector import Selector
-from jaxsub.discrepancy.view import facts, look
+from jaxsub.discrepancy.view import Parts, facts, look
 from jaxsub.effects import AbstractInstrument, FluidMemory, amplitude, candidates
 from jaxsub.effects.hull import CrossflowDrag
 from jaxsub.effects.sensor_mounting import SensorLeverArm
@@ -44,7 +44,7 @@ def dense():
     prior = np.diag([0.0, 0.3, 0.2, 0.1])
     gram = W.T @ W
     gram[:4, :4] += prior
-    return W, prior, Products(Disturbance(*jnp.ones((3, 1))), gram, np.array([0.7]), 40, 4, gram[None])
+    return W, prior, Products(Disturbance(*jnp.ones((3, 1))), gram, 0.7, 40, 4)
 
 
 def log_evidence(W, prior, chosen):
@@ -62,12 +62,13 @@ def test_a_part_is_predicted_by_all_that_the_others_leave_open(dense, chosen):
     """Claim: it is the density of the part given the others, of the dense covariance of all."""
     W, prior, whole = dense
     rows = np.split(np.arange(40), 4)
-    parts = np.stack([W[at].T @ W[at] for at in rows])
-    split = dataclasses.replace(whole, parts=parts, spreads=np.array([0.1, 0.2, 0.3, 0.1]))
+    own = W[:, [0, 1, 2, 3, *(4 + c for c in chosen)]]
+    split = Parts(np.stack([own[at].T @ own[at] for at in rows]), np.array([0.1, 0.2, 0.3, 0.1]))
     J, S = W[:, 1:4], W[:, [4 + c for c in chosen]]
+    found = conditional(whole.with_priors(chosen), split)
     covariance = np.eye(40) + J @ np.diag(1.0 / np.diag(prior)[1:]) @ J.T + 40.0 * S @ S.T
     density = lambda at: stats.multivariate_normal(np.zeros(len(at)), covariance[np.ix_(at, at)]).logpdf(W[at, 0])
-    for at, spread, predicted in zip(rows, split.spreads, split.predicted(chosen), strict=True):
+    for at, spread, predicted in zip(rows, split.log_determinants, found, strict=True):
         given = density(np.arange(40)) - density(np.setdiff1d(np.arange(40), at))
         np.testing.assert_allclose(predicted, given + 5.0 * np.log(2.0 * np.pi) - spread, rtol=1e-10)
 
@@ -96,7 +97,7 @@ def test_statistic_is_chi_square_where_nothing_is_left_out(clean):
         white[:, 0] = rng.standard_normal(len(white)) * measured
         gram = white.T @ white
         gram[: len(clean.prior), : len(clean.prior)] += np.asarray(clean.prior)
-        products = Products(clean.disturbance, gram, np.zeros(1), int(measured.sum()), len(clean.prior), gram[None])
+        products = Products(clean.disturbance, gram, 0.0, int(measured.sum()), len(clean.prior))
         single = [own for own in owners if len(own) == 1]
         kept = products.kept(single)
         draws.append(products.gains([], single).statistic[kept > 1e-3])
