@@ -20,7 +20,7 @@ class Fault:
 
     - `unit`: of the sizes. `sizes`: what is tried, from what nobody could see to what nobody could miss.
     - `put`: gives the run with the fault of a size.
-    - `checks`: the checks, and `channel` the channel, of a finding that names it; `word` stands in its text.
+    - `checks`: the checks, and `channel` the channel, of a finding that names it; `word` is in its text.
     """
 
     unit: str

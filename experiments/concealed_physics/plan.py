@@ -93,7 +93,7 @@ def _seen(truth) -> bool:
 
 
 def _several(count: int, rng: np.random.Generator) -> tuple[str, ...]:
-    """Effects on the same vehicle, of different families and so no near-twins."""
+    """Effects on the same vehicle, of different families and so not nearly collinear."""
     families: dict[str, list[str]] = {}
     for key, truth in TRUTHS.items():
         if truth.vehicle == "nps" and not truth.outside:

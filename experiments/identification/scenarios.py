@@ -61,7 +61,7 @@ def judged(method: AbstractMethod, problem: Problem, start: jax.Array, held_out:
 
 
 def free_run(problem: Problem, vehicle, held_out: list[Recording]) -> dict[str, float]:
-    """rms(error)/σ by channel and over all, of a free run through recordings that were not fitted."""
+    """rms(error)/σ by channel and over all, of simulation of recordings that were not fitted."""
     other = setup.problem(vehicle, held_out)
     error = output_errors(vehicle, other.runs, at_rest(vehicle, len(held_out))) / problem.sigma
     return channel_rms(error, other.runs, vehicle.layout.channels) | {"all": float(jnp.sqrt(jnp.mean(error**2)))}

@@ -1,6 +1,6 @@
 """What named physics is worth when a person picks it from the literature: the yardstick for what `diagnose` found.
 
-Every number is by output error (free run), fitted on the training runs, and judged by free runs through the others.
+Every number is by output error (simulation), fitted on the training runs, and judged by simulation of the others.
 """
 
 from collections.abc import Sequence

@@ -138,7 +138,7 @@ def _recording(name: str, rows: pd.DataFrame) -> Recording:
 
 
 def report(out: Path) -> dict:
-    """Diagnose, and the share of each channel that the free run through the held-out zigzags explains."""
+    """Diagnose, and the share of each channel that simulation of the test zigzags explains."""
     question = case()
     diagnosis, results = diagnose_case(question, out)
     results["held_out_fit_percent"] = {which: fit_percent(diagnosis, which) for which in ("baseline", "improved")}

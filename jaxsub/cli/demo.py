@@ -25,7 +25,7 @@ _WRONG = 0.2
 
 
 def concealable(vehicle: AbstractVehicle) -> list[AbstractEffect]:
-    """Effects large enough to matter to an operator, and different enough to be told apart in these runs."""
+    """Effects large enough to matter to an operator, and different enough to be distinguished in these runs."""
     layout = vehicle.layout
     effects: list[AbstractEffect] = [
         CrossflowDrag("horizontal", layout.length, layout.diameter, number(0.7)),

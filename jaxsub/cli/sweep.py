@@ -30,7 +30,7 @@ _RESULT, _FIGURES = "sweep.json", "figures"
 
 @dataclasses.dataclass(frozen=True)
 class Asked:
-    """What the command line asks for."""
+    """The options of the command line."""
 
     vehicle: Path
     runs: Sequence[Path]
@@ -132,7 +132,7 @@ def _replace(out: Path, folder: Path, scratch: Path, inputs: Sequence[Path]) -> 
 
 
 def make_plan(asked: Asked) -> Plan:
-    """The plan that was asked for. Raises `InputError` for whatever cannot be read or does not fit."""
+    """The plan of these options. Raises `InputError` for whatever cannot be read or does not fit."""
     vehicles = _by_stem([asked.vehicle, *asked.others], read_vehicle)
     for path, vehicle in zip([asked.vehicle, *asked.others], vehicles.values(), strict=True):
         require_free(vehicle, str(path))

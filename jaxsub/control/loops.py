@@ -39,11 +39,11 @@ class Loop(eqx.Module):
         return cls(*(number(float(value)) for value in (proportional, integral, derivative, reach)))
 
     def demand(self, error: Array, held: Array, rate: Array | float = 0.0) -> Float[Array, ""]:
-        """The output asked for, before any limit; `held` is the integral."""
+        """The commanded output, before any limit; `held` is the integral."""
         return self.proportional * jnp.clip(error, -self.reach, self.reach) + held - self.derivative * rate
 
     def integrate(self, held: Array, error: Array, surplus: Array, dt: Array | float) -> Float[Array, ""]:
-        """The integral `dt` s later; `surplus` is what was asked for and not given."""
+        """The integral `dt` s later; `surplus` is what was commanded and not given."""
         step = self.integral * jnp.clip(error, -self.reach, self.reach) * dt
         return jnp.where((jnp.abs(surplus) > _AT_LIMIT) & (step * surplus > 0.0), held, held + step)
 
@@ -110,7 +110,7 @@ def rate_loop(of: Axis, bandwidth: float, authority: float) -> Loop:
     r"""PI on the rate that puts both poles of $\dot\omega = a\omega + b\delta$ at -`bandwidth` (rad/s).
 
     A hull that is unstable on course overshoots any step, and is lost if that takes it past what its fins can hold.
-    There the proportional part feels only a quarter of the reference, and an error asks for `authority` rad at most.
+    There the proportional part feels only a quarter of the reference, and an error commands `authority` rad at most.
     """
     gain = (2.0 * bandwidth + of.a) / of.b
     if of.growth < 0.0:
@@ -120,7 +120,7 @@ def rate_loop(of: Axis, bandwidth: float, authority: float) -> Loop:
 
 def angle_loop(of: Axis, bandwidth: float, authority: float) -> Loop:
     r"""PID on the angle that puts two poles of $\ddot\alpha = a\dot\alpha + c\alpha + b\delta$ at -`bandwidth` (rad/s)
-    and one at a quarter of that. An error alone asks for `authority` rad at most, which leaves fin for damping."""
+    and one at a quarter of that. An error alone commands `authority` rad at most, which leaves fin for damping."""
     slow = bandwidth / 4.0
     derivative = (of.a + 2.0 * bandwidth + slow) / of.b
     proportional = (of.c + bandwidth**2 + 2.0 * bandwidth * slow) / of.b

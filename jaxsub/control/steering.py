@@ -53,14 +53,14 @@ class CourseRate(eqx.Module):
 class Depth(eqx.Module):
     r"""Elevators from depth: a loop from depth to pitch around one from pitch to elevators.
 
-    With the depth error e and $\dot z \approx -U_c\theta$ the pitch asked for is $\theta = -(\lambda e + h)/U_c$,
+    With the depth error e and $\dot z \approx -U_c\theta$ the commanded pitch is $\theta = -(\lambda e + h)/U_c$,
     $\dot h = \mu(\lambda e - \dot z)$: the integral learns the pitch of level flight only from a descent that differs
-    from the one asked for, so that depth follows its reference as $\lambda/(s + \lambda)$, without overshoot.
+    from the commanded one, so that depth follows its reference as $\lambda/(s + \lambda)$, without overshoot.
 
     **Fields**
 
     - `pace`: λ, 1/s. `outer`: rad of pitch from m. `inner`: rad of elevator from rad.
-    - `steepest`: largest pitch it asks for, rad.
+    - `steepest`: largest commanded pitch, rad.
     - `fins`: the elevators that move together.
     """
 
@@ -93,7 +93,7 @@ class Depth(eqx.Module):
         descent: Array,
     ) -> tuple[Array, Array, Array]:
         """What is wanted of the pitch (rad), what the integral of depth learns from (m) given the rate of `descent`
-        (m/s), and what of the pitch asked for is not acted on (rad)."""
+        (m/s), and what of the commanded pitch is not acted on (rad)."""
         below = reference["depth"] - depth_of(shown)
         wanted = self.outer.demand(below, held)
         error = jnp.clip(wanted, -self.steepest, self.steepest) - shown["theta"]

@@ -210,5 +210,5 @@ def most_explained(view: View, disturbance: Disturbance) -> float:
 
 
 def _owners(forces: Sequence[SmoothForce], first: int, knots: int) -> list[list[int]]:
-    """The columns of each force's hats, which begin after the `first`."""
+    """The columns of each force's hat functions, which begin after the `first`."""
     return [list(range(first + knots * i, first + knots * (i + 1))) for i in range(len(forces))]

@@ -52,7 +52,7 @@ def beyond_noise(left: dict[str, Remainder], rms: dict[str, float], layout: Layo
     found = [c for c in stated if left[c].low > 1.0 and left[c].random < RESIDUAL_LEVEL]
     led = lambda one: f", with {one.follows}" if one.independent < RESIDUAL_LEVEL else ""
     said = ", ".join(f"{c} ({rms[c]:.2g} σ{led(left[c])})" for c in found)
-    return [f"Free runs through the held-out runs leave more than noise in {said}."] if found else []
+    return [f"Simulation of the test runs leaves more than noise in {said}."] if found else []
 
 
 def _remainder(

@@ -79,7 +79,7 @@ class AbstractEffect(eqx.Module):
 
     @property
     def label(self) -> str:
-        """A name that tells apart two forms of one effect, such as `quadratic-damping[roll]`."""
+        """A name that distinguishes two forms of one effect, such as `quadratic-damping[roll]`."""
         chosen = ",".join(value for value in options(self).values() if isinstance(value, str))
         return f"{self.name}[{chosen}]" if chosen else self.name
 

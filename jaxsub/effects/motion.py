@@ -61,7 +61,7 @@ class Motion(eqx.Module):
     - `cruise`: the operating speed U_c (m/s) about which linear coefficients were taken.
     - `damping`: (n, n) linear damping of the equations in `rates`; times a velocity it is a force.
     - `time`: s from the run's own start.
-    - `accelerations`: rates of the free equations' velocities, where an accelerometer asks for them.
+    - `accelerations`: rates of the free equations' velocities, where an accelerometer needs them.
     - `water`: velocity of the water over ground in body axes (m/s), by the equation of the body's own; absent at rest.
     - `actuation`: the forces of the model's own actuators, each by itself.
     """

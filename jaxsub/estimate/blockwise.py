@@ -84,7 +84,7 @@ class GaussNewton(Iterative):
 
 
 def raced(searches: Sequence[Descent], tell: Passes = unwatched) -> Descent:
-    """Some searches, all begun anew: the one that is best at its end.
+    """Some searches, none begun yet: the one that is best at its end.
 
     All take some passes and the better half goes on, until one is left.
     """

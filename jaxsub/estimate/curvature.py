@@ -62,7 +62,7 @@ class Arrow(eqx.Module):
         return jnp.concatenate([shared, (own - through @ shared).ravel()])
 
     def gain(self, gradient: Float[Array, " d"]) -> Float[Array, ""]:
-        r"""$\tfrac12 g^TH^{-1}g$, less what lies in directions that nothing tells."""
+        r"""$\tfrac12 g^TH^{-1}g$, less what lies in unidentifiable directions."""
         left, right, _, own = self._eliminated(gradient, jnp.zeros(()))
         values, vectors = eigh(left)
         # what was taken off is exact to the rounding of a diagonal of ones
@@ -110,9 +110,9 @@ class Spectrum(eqx.Module):
         return self.vectors @ ((self.vectors.T @ vector) / (jnp.abs(self.values) + damping))
 
     def gain(self, gradient: Float[Array, " d"]) -> Float[Array, ""]:
-        r"""$\tfrac12 g^T|H|^{-1}g$, less what lies in directions that nothing tells.
+        r"""$\tfrac12 g^T|H|^{-1}g$, less what lies in unidentifiable directions.
 
-        Infinite where the curvature is not that of a minimum: there is more to gain than a full step tells.
+        Infinite where the curvature is not that of a minimum: there is more to gain than a full step promises.
         """
         size = jnp.abs(self.values)
         told = size > _FLAT * jnp.max(size, initial=0.0)

@@ -132,7 +132,7 @@ def search(
     """The maximum-likelihood vehicle, initial states and noise.
 
     `method` is Gauss–Newton where none is given. `known_start` takes the initial states `start` for the truth. `moving`
-    false keeps the vehicle and finds the initial states alone, as a run that the fit did not see asks for.
+    false keeps the vehicle and finds the initial states alone, as for a run that the fit did not see.
     Noise comes from `sigma`, else from the vehicle file; channels whose noise is to be estimated have it concentrated
     out: fit, take the rms, fit again from there, until it settles. `passes` is told as by `AbstractMethod.run`.
     """

@@ -64,9 +64,9 @@ def substeps_for(vehicle: AbstractVehicle, runs: Runs, motion: Motion, most: flo
 
 
 def substeps_free(vehicle: AbstractVehicle, runs: Runs) -> int:
-    """The same as the vehicle runs free, and as many as its file's noise asks of effects with states.
+    """The same in simulation, and as many as effects with states need for an error below the file's noise.
 
-    What the file does not say the noise of asks for none.
+    A channel without a noise in the file needs none.
     """
     runs = dataclasses.replace(runs, substeps=_followed_free(vehicle, runs))
     if not _with_states(vehicle):

@@ -1,4 +1,4 @@
-"""Filters of a vehicle that are told no more than its sensors' noise."""
+"""Filters of a vehicle that know no more than its sensors' noise."""
 
 from collections.abc import Callable
 

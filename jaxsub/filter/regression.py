@@ -73,7 +73,7 @@ def fuzzy_line(
     if isinstance(level, float) and not 0.0 <= level < 1.0:
         raise InputError("fuzzy_line", f"membership level {level:g}", "0 ≤ level < 1 is needed")
     first = jnp.argmax(mask)
-    # copies of a sample change nothing, so they stand in for the missing ones
+    # copies of a sample change nothing, so they fill the places of missing ones
     times, values = (jnp.where(mask, a, jnp.where(jnp.any(mask), a[first], 0.0)) for a in (times, values))
     origin, reference = jnp.min(times), jax.lax.stop_gradient(values[first])
     t, x = times - origin, values - reference

@@ -63,8 +63,8 @@ def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None, watch:
 class _Reduced(NamedTuple):
     """A fit's directions of unit information.
 
-    `gain` (R, s, p) is how initial states follow the coefficients, `pinned` (p, p) what priors tell, `directions` those
-    that anything tells and `untold` (p, p) the others.
+    `gain` (R, s, p) is how initial states follow the coefficients, `pinned` (p, p) the information of priors,
+    `directions` those that are identifiable and `untold` (p, p) the others.
     """
 
     gain: Array
@@ -92,7 +92,7 @@ def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array
     away = jnp.where(held, 0.0, problem.prior_mean - jnp.stack(at)) if at else jnp.zeros(0)
     pulled = jnp.column_stack([away, basis])
     prior = pulled.T @ (precision[:, None] * pulled)
-    # a direction that nothing tells has an empty column, and must not make the matrix of the others singular
+    # an unidentifiable direction has an empty column, and must not make the matrix of the others singular
     empty = jnp.all(basis == 0.0, axis=0)
     prior = prior.at[1:, 1:].add(jnp.diag(jnp.where(empty, 1.0, 0.0)))
     return _Reduced(gain, pinned, Directions(held, basis, prior), untold)
@@ -123,7 +123,7 @@ def _sandwich(reduced: _Reduced, disturbance: Disturbance, adjoint: Adjoint) -> 
 
 
 def _directions(information: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array, "p p"]]:
-    """Columns in which the information is the unit matrix, empty where it tells nothing, and the columns left out."""
+    """Columns in which the information is the unit matrix, empty where there is none, and the columns left out."""
     size = jnp.sqrt(jnp.diag(information))
     scale = jnp.where(size > 0.0, size, 1.0)
     values, vectors = jnp.linalg.eigh(information / jnp.outer(scale, scale))

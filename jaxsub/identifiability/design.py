@@ -62,7 +62,7 @@ def design(
 
     Of `starts` and a family of random telegraph signals drawn from `seed`, the best `searches` are improved by at most
     `steps` of L-BFGS each. Limits of channels are penalised in the search; what ends outside one is made smaller until
-    it is inside, as the starts are. The design tells no less than the best of its starts.
+    it is inside, as the starts are. The design is at least as informative as the best of its starts.
 
     `surroundings` (K,) are the interpolated columns of a vehicle that has any.
 

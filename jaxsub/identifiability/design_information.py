@@ -54,7 +54,7 @@ class Information:
 
     @property
     def least(self) -> float:
-        """Information in the direction that the run tells least about, prior included."""
+        """Information in the direction about which the run has least, prior included."""
         return float(np.linalg.eigvalsh(self._posterior)[0])
 
     @property
@@ -63,7 +63,7 @@ class Information:
         return float(np.trace(self.matrix)) / self.seconds
 
     def gain(self, other: "Information") -> float:
-        """How many times as much this tells as `other` of a coefficient, in the geometric mean (the D-criterion)."""
+        """How many times as much information as `other` this has on a coefficient, in the geometric mean (the D-criterion)."""
         return float(np.exp((self.log_det - other.log_det) / len(self.names)))
 
     @property

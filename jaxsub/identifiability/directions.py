@@ -4,7 +4,7 @@ With $J$ the whitened residuals' Jacobian by $\theta_i/|\theta_i|$, initial stat
 observations, $J = U\,\mathrm{diag}(s)\,V^T$: the direction $v_k$ is known to $1/s_k$ of the coefficients' own sizes. It
 is identified where that is below `FRACTION`, a half: a coefficient alone would then have an interval of 95 % that keeps
 its sign. And $s_k$ has to be above the rounding of the Jacobian, the end of a long recursion: half the digits of the
-float type, below the largest. A direction under that is told by nothing, however small the noise.
+float type, below the largest. A direction under that is unidentifiable, however small the noise.
 """
 
 import dataclasses

@@ -195,7 +195,7 @@ def _break(families: list[Family], partners: tuple[str, ...]) -> str:
     hold = f"hold {_one_of(partners)} at its known value or give it a prior"
     measure = f"measure {' and '.join(read)}, or " if read else ""
     leading = ", ".join(family.leading for family in families[:_NAMED])
-    return f"no input tells equivalent systems apart ({leading}): {measure}{hold}"
+    return f"no input distinguishes equivalent systems ({leading}): {measure}{hold}"
 
 
 def _unseen(name: str, families: list[Family], excitation: Excitation) -> str:
@@ -230,7 +230,7 @@ def _separate(
     left = {partner: error(partner) for partner in partners}
     best = min(left, key=lambda partner: left[partner], default="")
     signals = dict.fromkeys(s for n in (name, *partners[:1]) for s in excitation.regressors[n])
-    # a constant is told apart by what moves the other
+    # a constant is identifiable where the other varies
     moving = name if excitation.regressors[name] or not partners else partners[0]
     apart = (f"move {' and '.join(signals)} independently: " if len(signals) > 1 else "") + excitation.how(moving)
     if best and left[best] <= FRACTION:

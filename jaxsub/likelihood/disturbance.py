@@ -328,7 +328,7 @@ def _correlated(
 def smoothed(
     disturbance: Disturbance, system: System, column: Columns
 ) -> tuple[Float[Array, "r k n"], Float[Array, "r k n"]]:
-    """The disturbance force (N, N m) that one `column` asks for given all of its samples, and its standard deviation.
+    """The disturbance force (N, N m) of one `column` given all of its samples, and its standard deviation.
 
     The adjoint form of the smoother, which inverts no covariance of the state. Source: Bierman (1973), Automatica 9.
     """

@@ -1,4 +1,4 @@
-r"""A model that is led along its recordings: what it expects next, given all that was measured before.
+r"""One-step-ahead predictions of a model along its recordings, by an extended Kalman filter.
 
 An extended Kalman filter of [x, d], d a first-order Gauss–Markov force in each equation, follows every run. What it
 expects lies near the truth even where the model misses much, so that whatever is evaluated along its path — the
@@ -33,7 +33,7 @@ class Followed(eqx.Module):
     - `expected`: (R, K, s) states before, `filtered`: (R, K, s) after each sample was seen.
     - `force`: (R, K, n) the disturbance force (N, N m) after each sample.
     - `system`: linearised, steps at the filtered and outputs at the expected states.
-    - `residual`: one column, the measured outputs less those expected, and what led the path away from a free run.
+    - `residual`: one column, the measured outputs less those expected, and the filter's corrections of the path.
     - `theta`: p columns, by the free parameters.
     - `products`: (w, w) of the residual and `theta`, whitened under the disturbance, and zeros up to the width w of a
       program; `spread`: half the log-determinant of the residual's covariance.
@@ -57,7 +57,7 @@ def follow(
     start: Float[Array, "r s"],
     spread: Float[Array, " s"],
 ) -> Followed:
-    """`vehicle` led along `runs` from initial states of mean `start` and standard deviation `spread`.
+    """`vehicle` filtered along `runs` from initial states of mean `start` and standard deviation `spread`.
 
     `sigma` is the noise of the channels, SI, in whose units the columns are.
     """

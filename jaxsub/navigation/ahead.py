@@ -2,7 +2,7 @@
 
 A call costs the host about a microsecond for each array that goes in or comes out, and for each kernel that the program
 starts; a stream's state, a reading and an estimate together have some forty. Here all numbers of one type travel in one
-array: a state stays packed from call to call, and is unpacked when somebody asks for it.
+array: a state stays packed from call to call, and is unpacked when it is read.
 
 `native` makes C of the step, which has no kernels to start and takes half as long; it needs a C compiler and CasADi.
 

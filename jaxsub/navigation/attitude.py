@@ -33,7 +33,7 @@ class AbstractAttitude(AbstractProcess):
 
     **Fields**
 
-    - `gyro_range`: rad/s. A gyro at its stop tells no more than that the body turns faster: what it shows is then its
+    - `gyro_range`: rad/s. A saturated gyro shows no more than that the body turns faster: what it shows is then its
       standard deviation besides.
     """
 

@@ -44,7 +44,7 @@ class SensorNoise(eqx.Module):
 
     - `gyro`: rad/s/√Hz; `accelerometer`: m/s²/√Hz: white noise.
     - `gyro_share`, `accelerometer_share`: √s, $\varepsilon\sqrt{2\tau}$ of each axis.
-    - `gyro_range`: rad/s. A gyro at its stop tells no more than that the body turns faster.
+    - `gyro_range`: rad/s. A saturated gyro shows no more than that the body turns faster.
     - `magnetic_delay`: s by which the magnetometer's readings are older than the gyros'.
     """
 

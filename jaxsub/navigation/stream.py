@@ -43,7 +43,7 @@ class Faults(eqx.Module):
     - `untimed`: without a finite time, passed over. `behind`: earlier than one before, passed over.
     - `restarts`: earlier, after so many others that the clock was taken to have been set back; no time passed.
     - `duplicates`: of the time of the one before: no time passed. `gaps`: later than `Stream.longest` allows.
-    - `inputs`: with inputs that were not finite; the last good ones stood in.
+    - `inputs`: with inputs that were not finite; the last finite ones were used.
     - `saturated`: with an input at its range.
     - `outputs`: (c,) measured, but the number or its scale was not finite, or the scale not positive; left out.
     - `repeated`: (c,) measured already at that time; left out.
@@ -171,7 +171,7 @@ class Stream(AbstractStream):
     def start(self, state: FilterState, like: Reading) -> StreamState:
         """Before the first reading; readings will have the shapes of `like`, which may be the first itself.
 
-        Its inputs stand in until good ones come; those that are not finite count as zero.
+        Its inputs are held until finite ones come; those that are not finite count as zero.
         """
         inputs = jax.tree.map(lambda leaf: jnp.where(jnp.isfinite(leaf), leaf, jnp.zeros_like(leaf)), like.inputs)
         clock = Clock(jnp.zeros_like(like.time), jnp.zeros((), bool), jnp.zeros((), jnp.int32))

@@ -39,7 +39,7 @@ def load(
     """Read a file with a recording, or `columns` of a vehicle's log; the run is named after it.
 
     The file is .csv, .tsv or .txt, .parquet, .nc, .mat, .xlsx, or a .zip of one of these, `runs.zip!dive.csv` where it
-    holds several. How it was read stands in the run's findings, where that is not plain. The rest is for logs alone and
+    holds several. How it was read is in the run's findings, where that is not plain. The rest is for logs alone and
     handed to `load_log`. Raises InputError, naming the file and where it applies the row and column, whatever the file
     holds.
     """

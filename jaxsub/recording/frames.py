@@ -54,7 +54,7 @@ def to_pandas(recording: Recording, units: Mapping[str, str] | None = None) -> "
 def from_xarray(dataset: "xarray.Dataset", name: str = "run") -> Recording:
     """The run in the variables of `dataset`, one number a sample each, `t` its times.
 
-    A variable's unit is its attribute `units`, or stands in its name as in a file's header; without either it is SI.
+    A variable's unit is its attribute `units`, or is in its name as in a file's header; without either it is SI.
     Instants count in s from the first. Raises InputError for whatever a file would be refused for, naming `name`.
     """
     return recorded(variables(dataset, name), name, name)

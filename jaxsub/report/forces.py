@@ -1,4 +1,4 @@
-"""The force figure: what each equation of motion asks for beyond the model, over time."""
+"""The force figure: what the model lacks in each equation of motion, over time."""
 
 from collections.abc import Sequence
 

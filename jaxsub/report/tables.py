@@ -90,7 +90,7 @@ def fit_rows(diagnosis: Diagnosis) -> list[FitRow]:
 
 
 def check_rows(diagnosis: Diagnosis) -> list[CheckRow]:
-    """One row for each channel whose remainders on the held-out runs were tested."""
+    """One row for each channel whose residuals on the test runs were tested."""
     models = list(diagnosis.remains.values())
     channels = models[0] if models else {}
     tests = (_between, _random, _follows)
@@ -139,7 +139,7 @@ def run_number(diagnosis: Diagnosis) -> KeyNumber:
     held_out = sum(run.role != "train" for run in diagnosis.runs)
     minutes = sum(run.duration for run in diagnosis.runs) / 60.0
     label = "run" if len(diagnosis.runs) == 1 else "runs"
-    detail = f"{len(diagnosis.runs) - held_out} fitted, {held_out} held out; {minutes:.1f} min in all"
+    detail = f"{len(diagnosis.runs) - held_out} for training, {held_out} for the test; {minutes:.1f} min in all"
     return KeyNumber(str(len(diagnosis.runs)), label, detail)
 
 

@@ -45,7 +45,7 @@ def integrate(
 ) -> Float[Array, "r k s"]:
     r"""States at the samples of `runs` of $\tilde M\dot\nu = \tilde A\nu + \tau$ from the initial states `start`.
 
-    Tsit5 with a step chosen by its error (`rtol`, `atol` in SI), begun anew at every sample, so that no step spans a
+    Tsit5 with a step chosen by its error (`rtol`, `atol` in SI), restarted at every sample, so that no step spans a
     jump of a held input: there a step that did would be rejected again and again, and the time of the jump would have
     no derivative (diffrax issues 766 and 729). Inside an interval the signals follow the parabola through their values
     at its start, middle and end; `runs.substeps` plays no part. A run that diverges becomes NaN there and stays so,

@@ -80,7 +80,7 @@ def check_inputs(layout: Layout, parts: Iterable[Actuator | AbstractEffect | Der
 
 
 def inputs_of(part: Actuator | AbstractEffect | Derivative | None) -> Iterator[str]:
-    """The inputs that an actuator or a coefficient acts through, and the names that an effect is told."""
+    """The inputs that an actuator or a coefficient acts through, and the names that an effect takes."""
     if isinstance(part, Derivative):
         yield from part.inputs
     elif isinstance(part, Actuator):

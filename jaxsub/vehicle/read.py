@@ -96,7 +96,7 @@ def vehicle_from(
 
 
 def _read_model(table: Table) -> str:
-    """Which products of velocities `[model]` asks for."""
+    """Which products of velocities `[model]` has."""
     table.only(("coriolis",))
     return table.choice("coriolis", CORIOLIS) if "coriolis" in table.data else CORIOLIS[0]
 

@@ -1,4 +1,4 @@
-"""What remains of held-out runs is told from noise and from what follows an input, and from nothing else."""
+"""What remains of test runs is distinguished from noise and from what follows an input, and from nothing else."""
 
 import dataclasses
 

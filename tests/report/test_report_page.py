@@ -97,10 +97,10 @@ def test_what_stands_in_without_a_name_is_shown_to_help():
 
 
 def test_the_regime_and_what_an_effect_trades_with_are_said():
-    """Claim: a mismatch has the regime it stands out in, and an effect the coefficient it is told together with."""
+    """Claim: a mismatch has the regime it stands out in, and an effect the coefficient that it is correlated with."""
     text = Outline(render(diagnosis("named"), VEHICLE, {})).text.replace("\u202f", " ")
     assert "|r| ≥ 0.12 rad/s81 % of it, 6 % of the rest" in text
-    assert "trades withY_v, correlation −0.97" in text
+    assert "correlated withY_v, correlation −0.97" in text
 
 
 def test_the_kind_of_mismatch_is_said():

@@ -55,7 +55,7 @@ def test_key_numbers():
     assert tables.gain_number(diagnosis("unknown")).value == "15.4"
     assert tables.gain_number(diagnosis("unknown", described=True)).value == "15.4 → 1.10"
     assert tables.gain_number(bare()) is None
-    assert tables.run_number(diagnosis("none")).detail.startswith("2 fitted, 1 held out")
+    assert tables.run_number(diagnosis("none")).detail.startswith("2 for training, 1 for the test")
 
 
 def test_intervals_are_told_by_run_and_counted_when_many():

@@ -8,7 +8,7 @@ from ...errors import InputError
 from ...findings import Finding
 from .log import Series
 
-_FAR = 6.0 * 3600.0  # s from all other samples: a stamp that is a day off, or stands in 1970
+_FAR = 6.0 * 3600.0  # s from all other samples: a stamp that is a day off, or in 1970
 _BOOT, _SINCE_1970 = 1e8, 5e8  # s: three years since a computer began, and the year 1985
 _FEW = 0.1  # no more than this part of a channel is dropped
 _REMEDY = "see whether clocks differ"
