@@ -4,8 +4,8 @@ It is drawn through `FINE` knots whose heights have a Gaussian prior before the 
 $s^2\exp(-\tfrac12(x_i-x_j)^2/\ell^2)$ with $\ell$ some share of the variable's range and $s$ where the evidence is
 largest. So what a smooth function gains and what it costs is that of the few shapes that the data tell, however many
 knots there are, and a function of many periods is found like one of a single bend. With the whitened products G of the
-knots' hat functions among themselves, b of theirs with the residual, and $L L^T$ the covariance for s = 1, the log evidence
-gained is
+knots' hat functions among themselves, b of theirs with the residual, and $L L^T$ the covariance for s = 1, the log
+evidence gained is
 
 $$\tfrac12 \sum_i \Bigl[\frac{s^2 c_i^2}{1 + s^2\lambda_i} - \ln(1 + s^2\lambda_i)\Bigr],\qquad
 L^T G L = U\lambda U^T,\; c = U^T L^T b.$$
@@ -35,7 +35,7 @@ _ROUNDING = 1e-8
 
 
 class Smooth(NamedTuple):
-    """What the likeliest smooth function gains in log evidence, and by which weights hat functions become columns of its prior.
+    """The gain in log evidence of the most probable smooth function, and its columns as sums of hat functions.
 
     The columns' amplitudes are independent before the data, and worth one sample. (FINE, FINE). `size`: s, infinite
     where no such function gains.
@@ -47,7 +47,7 @@ class Smooth(NamedTuple):
 
 
 def smoothest(products: Products, chosen: Sequence[int], hats: Sequence[int], length: np.ndarray) -> Smooth:
-    """The likeliest smooth function on top of the candidates `chosen`, its `hats` (hat functions) being of these lengths."""
+    """The most probable smooth function beside the candidates `chosen`; its hat functions `hats` have these lengths."""
     G, b = products.remaining(chosen, hats)
     G, b = G * np.outer(length, length), b * length
     best = Smooth(0.0, np.zeros_like(G), math.inf)

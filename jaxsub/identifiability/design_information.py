@@ -63,7 +63,7 @@ class Information:
         return float(np.trace(self.matrix)) / self.seconds
 
     def gain(self, other: "Information") -> float:
-        """How many times as much information as `other` this has on a coefficient, in the geometric mean (the D-criterion)."""
+        """The ratio of information on a coefficient to that of `other`, in the geometric mean (the D-criterion)."""
         return float(np.exp((self.log_det - other.log_det) / len(self.names)))
 
     @property

@@ -1,4 +1,4 @@
-"""A plan in words and digests: what distinguishes one sweep from another, and what a store needs to be read without it."""
+"""A plan in words and digests: what distinguishes sweeps, and what a store needs to be read without it."""
 
 import hashlib
 import json
