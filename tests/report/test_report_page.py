@@ -88,12 +88,12 @@ def test_verdict_chooses_sections(page, verdict, badge, sections):
     assert ("Nowhere significantly" in outline.text) == (verdict == "none")
 
 
-def test_what_stands_in_without_a_name_is_shown_to_help():
+def test_surrogate_terms_of_an_unknown_mismatch_are_shown_to_help():
     """Claim: an unknown mismatch that is described has the improved model's terms, errors and coefficients."""
     text = Outline(render(diagnosis("unknown", described=True), VEHICLE, {})).text
-    assert "Nothing in the vocabulary explains" in text and "claims no cause" in text
+    assert "Nothing in the vocabulary explains" in text and "claim no cause" in text
     assert "[[effects]]" in text and "15.4 → 1.10" in text and "Before and after" in text
-    assert "claims no cause" not in Outline(render(diagnosis("unknown"), VEHICLE, {})).text
+    assert "claim no cause" not in Outline(render(diagnosis("unknown"), VEHICLE, {})).text
 
 
 def test_the_regime_and_what_an_effect_trades_with_are_said():
