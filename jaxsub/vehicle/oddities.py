@@ -3,7 +3,7 @@ no rigid body has."""
 
 from collections.abc import Iterator
 
-from ..effects import EQUATIONS, GRAVITY, VELOCITIES, AbstractForce, derivative
+from ..effects import EQUATIONS, GRAVITY, VELOCITIES, AbstractForce, ActuatorGain, derivative
 from ..findings import Finding
 from .base import AbstractVehicle, Layout
 from .checks import inputs_of
@@ -62,6 +62,9 @@ def _twice(body: SubmergedBody, where: str) -> Iterator[Finding]:
             said = "[model] coriolis" if effect.term == "coriolis" else f"the coefficient {effect.term}"
             what = f"says what {said} says, so no recording can tell them apart"
             yield Finding("said-twice", "warning", f"{where}: effects ({effect.label})", what, "delete one")
+        if isinstance(effect, ActuatorGain) and effect.actuator not in body.fixed_gains:
+            what = f"scales the force of {effect.actuator}, as free numbers do, so no recording can tell them apart"
+            yield Finding("said-twice", "warning", f"{where}: effects ({effect.label})", what, "delete it or fix those")
     for name, term in derivatives(body.own_values()).items():
         if term.name in body.actuators.names:
             devices = [one.name for one in body.actuators.items if set(term.inputs) & set(dict(one.input))]

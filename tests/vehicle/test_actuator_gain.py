@@ -19,7 +19,7 @@ from jaxsub.effects import (
 )
 from jaxsub.errors import InputError
 from jaxsub.simulate import at_rest, simulate, synthetic
-from jaxsub.vehicle import added_effects, vehicle_from, vehicle_text, with_coefficients
+from jaxsub.vehicle import added_effects, vehicle_findings, vehicle_from, vehicle_text, with_coefficients
 
 PLACE, AHEAD, ACROSS = [-0.2, 0.15, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]
 THRUSTER = {"kind": "thruster", "position": PLACE, "direction": AHEAD, "forward": 0.8, "reverse": 0.6, "dead_band": 0.2}
@@ -182,6 +182,13 @@ def test_effect_on_no_actuator_is_refused():
     tree["effects"] = [{"effect": "actuator-gain", "actuator": "prt", "parameters": {"g": -0.2}}]
     with pytest.raises(InputError, match=r"effects\[1\] \(actuator-gain\): prt: unknown key; did you mean port"):
         vehicle_from(tree, "body.toml")
+
+
+def test_effect_beside_a_free_gain_is_reported():
+    """Claim: said twice where the gain is free, and not where it is fixed."""
+    for gain, expected in ((FREE, ["body.toml: effects (actuator-gain[port])"]), (FIXED, [])):
+        vehicle = body({"port": THRUSTER | {"gain": gain}}).with_effect(ActuatorGain("port", jnp.asarray(-0.2)))
+        assert [one.where for one in vehicle_findings(vehicle, "body.toml") if one.check == "said-twice"] == expected
 
 
 VOCABULARY = (ActuatorGain, ActuatorBacklash, QuadraticDamping, SensorScale)
