@@ -27,9 +27,9 @@ def draw(results: dict, path: Path) -> None:
     axis.set_yticks(range(len(cases)), [f"{line['vehicle']}:\n{line['concealed']}" for line in cases], fontsize=8)
     axis.set_ylim(max(len(cases), 1) - 0.5, -0.5)
     axis.set_xscale("log")
-    axis.margins(x=0.35)
+    axis.margins(x=0.5)
     axis.set_xlabel("largest rms residual of a channel on the test run, in σ")
     if cases:
-        axis.legend(fontsize=8, loc="upper right")
+        axis.legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     figure.savefig(path, dpi=110)
     plt.close(figure)

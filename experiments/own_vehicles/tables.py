@@ -27,6 +27,7 @@ def _row(line: dict[str, Any]) -> list[str]:
 
 
 def _entry(entry: dict[str, Any]) -> str:
+    """The name of an effect with its rivals', or with its number where it has one and no rivals."""
     rivals = "".join(f" or `{name}`" for name, _ in entry["rivals"])
-    sizes = ", ".join(f"{symbol} = {value:.3g} ± {error:.1g}" for symbol, (value, error) in entry["parameters"].items())
-    return f"`{entry['effect']}`{rivals}{' (' + sizes + ')' if sizes else ''}"
+    sizes = [f"{symbol} = {value:.3g} ± {error:.1g}" for symbol, (value, error) in entry["parameters"].items()]
+    return f"`{entry['effect']}`{rivals}" + (f" ({sizes[0]})" if len(sizes) == 1 and not rivals else "")
