@@ -22,6 +22,7 @@ _EXTRAS = ["fenced-code-blocks", "tables", "header-ids", "code-friendly", "cuddl
 # in the order in which they are read
 GUIDES = (
     "index",
+    "begin-a-vehicle-file",
     "add-a-vehicle",
     "logs-and-data",
     "commands",
