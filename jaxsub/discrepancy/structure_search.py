@@ -65,7 +65,7 @@ def answers(
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
     # a simulation that cannot be fitted proposes nothing
-    told_ahead = bool(baseline.fit.result != RESULTS.successful)
+    told_ahead = not bool(baseline.fit.result == RESULTS.successful)
     ahead = stepwise_by_innovations(fitter, baseline, vocabulary) if told_ahead else None
     if ahead is not None:
         return *ahead, None

@@ -40,7 +40,7 @@ _SIDE_BY_SIDE = 16
 class _Given(NamedTuple):
     parts: tuple[Averages, ...]
     prior: Array
-    centre: Array
+    centre: Values
 
 
 def estimate_disturbance(
@@ -79,12 +79,13 @@ def estimate_disturbance(
 def _search(given: _Given, begin: Disturbance, steps: int) -> tuple[Disturbance, Bool[Array, ""]]:
     """At most so many `steps` from `begin`, and whether they arrived."""
     solver = Damped(_expand, _ENOUGH, _FARTHEST)
-    end = optx.minimise(_cost, solver, _logarithms(begin), given, max_steps=steps, throw=False)
+    end = optx.minimise(_cost, solver, jnp.asarray(_logarithms(begin)), given, max_steps=steps, throw=False)
     return _parts(given, end.value), end.result == optx.RESULTS.successful
 
 
-def _logarithms(disturbance: Disturbance) -> Array:
-    return jnp.log(jnp.concatenate([disturbance.force, disturbance.time, disturbance.noise]))
+def _logarithms(disturbance: Disturbance) -> Values:
+    xp = namespace(*jax.tree.leaves(disturbance))
+    return xp.log(xp.concatenate([disturbance.force, disturbance.time, disturbance.noise]))
 
 
 def _parts(given: _Given, y: Array) -> Disturbance:
