@@ -4,13 +4,46 @@ import itertools
 import json
 import multiprocessing
 import os
+import tempfile
 import threading
+import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from jaxsub.cli import terminal
+from jaxsub.cli import session, terminal
+
+
+def completed(
+    cases: Sequence[Any],
+    out: Path,
+    work: Callable[[Any], dict],
+    said: Callable[[dict], str],
+    name: Callable[[Any], str],
+    **processes: int,
+) -> list[dict]:
+    """All lines of `out`/cases.jsonl, once `run` has done those of `cases` that have none there by their `name`."""
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / "cases.jsonl"
+    done = {line["case"] for line in read(path)}
+    run([case for case in cases if name(case) not in done], path, work, said, **processes)
+    return read(path)
+
+
+def with_files(line: dict, generate: Callable[[Path], dict], answered: Callable[[Path, dict], dict]) -> dict:
+    """`line` and what is `answered` of the files and the truth that `generate` makes; `why` where it makes none.
+
+    One case that cannot be made must not end the hours of the others.
+    """
+    session.start()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "files"
+        try:
+            truth = generate(folder)
+        except Exception:
+            return line | {"why": traceback.format_exc()[-600:]}
+        return line | answered(folder, truth)
 
 
 def run(

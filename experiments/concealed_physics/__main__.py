@@ -12,7 +12,7 @@ from pathlib import Path
 
 from jaxsub.cli import terminal
 
-from ..cases import read, run
+from ..cases import completed
 from .assemble import assemble, is_right
 from .figures import draw
 from .plan import COUNTS, ordered
@@ -33,12 +33,9 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="cases at once")
     chosen = parser.parse_args()
     counts = {c: chosen.count or counts[chosen.quick] for c, counts in COUNTS.items() if chosen.part in (None, c)}
-    chosen.out.mkdir(parents=True, exist_ok=True)
-    path = chosen.out / "cases.jsonl"
-    done = {line["case"] for line in read(path)}
-    todo = [case for case in ordered(counts)[chosen.skip :] if case.name not in done]
-    run(todo, path, work, said, jobs=chosen.jobs, together=_CASES_A_PROCESS)
-    results = assemble(read(path))
+    processes = {"jobs": chosen.jobs, "together": _CASES_A_PROCESS}
+    cases = ordered(counts)[chosen.skip :]
+    results = assemble(completed(cases, chosen.out, work, said, name=lambda case: case.name, **processes))
     (chosen.out / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
     draw(results, chosen.out / "figures")
     terminal.note(f"results: {chosen.out / 'results.json'}")

@@ -1,12 +1,11 @@
 """One case from beginning to end: files made, judged, given to the peers; what came of it in one line."""
 
 import dataclasses
-import tempfile
 import traceback
+from functools import partial
 from pathlib import Path
 
-from jaxsub.cli import session
-
+from ..cases import with_files
 from .generate import generate
 from .judge import judge
 from .peers import peers
@@ -15,21 +14,16 @@ from .plan import Case
 
 def work(case: Case) -> dict:
     """The line of `case`; it has no `answer` where its files could not be made."""
-    session.start()
     line = dataclasses.asdict(case) | {"case": case.name}
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch) / "files"
-        try:
-            truth = generate(case, folder)
-        except Exception:
-            # one case that cannot be made must not end the hours of the others; the line says why
-            return line | {"why": traceback.format_exc()[-600:]}
-        if not folder.exists():
-            return line | {"truth": truth, "why": "cannot be of any size in its row"}
-        reached = min(truth["reached"], default=0.0)
-        sized = min(case.sizes, key=lambda s: abs(s - reached), default=0.0)
-        line |= {"truth": truth, "size": sized, "answer": judge(folder)}
-        return line | {"peers": _peers(folder, case.body)}
+    return with_files(line, partial(generate, case), partial(_answered, case))
+
+
+def _answered(case: Case, folder: Path, truth: dict) -> dict:
+    if not folder.exists():
+        return {"truth": truth, "why": "cannot be of any size in its row"}
+    reached = min(truth["reached"], default=0.0)
+    sized = min(case.sizes, key=lambda s: abs(s - reached), default=0.0)
+    return {"truth": truth, "size": sized, "answer": judge(folder), "peers": _peers(folder, case.body)}
 
 
 def _peers(folder: Path, body: str) -> dict:

@@ -9,7 +9,7 @@ import argparse
 import json
 from pathlib import Path
 
-from experiments.cases import read, run
+from experiments.cases import completed
 from experiments.concealed_physics.scoring import rate
 from jaxsub.cli import terminal
 
@@ -26,12 +26,8 @@ def main() -> None:
     parser.add_argument("--part", choices=[case.name for case in CASES], help="this case alone")
     parser.add_argument("--jobs", type=int, default=1, help="cases at once")
     chosen = parser.parse_args()
-    chosen.out.mkdir(parents=True, exist_ok=True)
-    path = chosen.out / "cases.jsonl"
-    done = {line["case"] for line in read(path)}
     asked = [case.name for case in CASES[: QUICK if chosen.quick else None] if chosen.part in (None, case.name)]
-    run([name for name in asked if name not in done], path, work, said, jobs=chosen.jobs)
-    results = assemble(read(path))
+    results = assemble(completed(asked, chosen.out, work, said, name=str, jobs=chosen.jobs))
     (chosen.out / "results.json").write_text(json.dumps(results, indent=1, ensure_ascii=False), encoding="utf-8")
     draw(results, chosen.out / "answers.png")
     terminal.note(f"results: {chosen.out / 'results.json'}")

@@ -1,12 +1,11 @@
 """One case from beginning to end: files made, judged, scored; what came of it in one line."""
 
-import tempfile
-import traceback
+from functools import partial
 from pathlib import Path
 
+from experiments.cases import with_files
 from experiments.concealed_physics import scoring
 from experiments.concealed_physics.judge import judge
-from jaxsub.cli import session
 from jaxsub.vehicle import read_vehicle
 
 from .generate import generate
@@ -18,22 +17,18 @@ _LEVEL, _CLOSE = 0.01, 0.05
 
 def work(name: str) -> dict:
     """The line of the case of that name; it has no `answer` where its files could not be made."""
-    session.start()
     case = next(case for case in CASES if case.name == name)
     line = {"case": case.name, "vehicle": case.vehicle, "concealed": case.concealed}
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch) / "files"
-        try:
-            truth = generate(case, folder)
-        except Exception:
-            # one case that cannot be made must not end the others; the line says why
-            return line | {"why": traceback.format_exc()[-600:]}
-        answer = judge(folder)
-        improved = folder / "out" / "improved.toml"
-        if improved.is_file():
-            values = read_vehicle(improved).values()
-            answer["values"] = {name: float(values[name]) for name in truth["values"] if name in values}
-    return line | {"truth": truth, "answer": answer, "mark": mark(truth, answer)}
+    return with_files(line, partial(generate, case), _answered)
+
+
+def _answered(folder: Path, truth: dict) -> dict:
+    answer = judge(folder)
+    improved = folder / "out" / "improved.toml"
+    if improved.is_file():
+        values = read_vehicle(improved).values()
+        answer["values"] = {name: float(values[name]) for name in truth["values"] if name in values}
+    return {"truth": truth, "answer": answer, "mark": mark(truth, answer)}
 
 
 def mark(truth: dict, answer: dict) -> str:
