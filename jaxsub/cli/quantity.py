@@ -5,11 +5,8 @@ from collections.abc import Callable
 from typing import Any
 
 import click
-import numpy as np
 
-from ..units import UnknownUnit, same_dimension, to_si
-
-# said here and not asked of `vehicle`, so that `--help` needs no jax; a test holds the two together
+# said here and not asked of `vehicle`, so that `--help` needs no jax or NumPy; a test holds the two together
 DIMENSIONS = {
     "length": ("m", "Of the hull; of a ship between perpendiculars."),
     "diameter": ("m", "Largest, of a round hull."),
@@ -38,6 +35,10 @@ class Quantity(click.ParamType):
         Raises
             click.BadParameter: it is no positive number, or of another dimension.
         """
+        import numpy as np
+
+        from ..units import UnknownUnit, same_dimension, to_si
+
         found = re.fullmatch(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)", str(value))
         if not found:
             self.fail(f"{value!r:.60} is no number; write it like 1.6 or 1.6{self.unit}", param, ctx)

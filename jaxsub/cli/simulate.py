@@ -111,7 +111,7 @@ def initial_state(
     found = search(vehicle, runs, moving=False)
     if not bool(jnp.isfinite(found.cost)):
         raise InputError(where, "the model diverges from every initial state tried", "check the coefficients' signs")
-    if bool(found.result == RESULTS.successful):
+    if found.converged:
         return start, found.start[0], []
     what = f"the search for the initial state did not converge: {RESULTS[found.result]}"
     return start, found.start[0], [Finding("initial-state", "warning", where, what, "try --start recorded")]

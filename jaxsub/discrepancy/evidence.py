@@ -211,16 +211,13 @@ class Evidence:
         samples = int(np.sum(np.asarray(system.measured)))
         return Products(disturbance, gram, float(log_determinant), samples, len(prior))
 
-    def parts(self, chosen: Sequence[int], disturbance: Disturbance) -> Parts:
-        """Products of the residual, the free parameters and the candidate columns `chosen` by part, priors apart."""
-        return self.view.products(self.view.base + self.picked(chosen), disturbance)
-
     def predicted(self, chosen: Sequence[int], products: Products) -> Float[np.ndarray, " m"]:
         """Log probability of each part of the recordings by the others, which leave every number some room.
 
         At the estimates by the others, parameters that these hardly identify would count as wrong predictions.
         """
-        return conditional(products.with_priors(chosen), self.parts(chosen, products.disturbance))
+        parts = self.view.products(self.view.base + self.picked(chosen), products.disturbance)
+        return conditional(products.with_priors(chosen), parts)
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Evidence":
         """Of a view along the same path whose residual and free parameters are sums `keep` (1 + p, 1 + m) of these."""

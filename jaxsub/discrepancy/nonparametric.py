@@ -8,17 +8,18 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
+import jax
 import numpy as np
 from scipy import special
 
 from ..effects import KNOTS, SmoothForce, with_numbers
-from ..likelihood import Disturbance, smoothed
+from ..likelihood import Columns, Disturbance, smoothed
 from .columns import columns_of
 from .evidence import Evidence, Products, conditional
 from .settings import FORCE_DISTURBANCE_SHARES, LENGTH_SCALES, MAJORITY, SIGNIFICANCE
 from .smoothness import FINE, Smooth, coarse, smoothest
 from .spline_basis import basis_forces, promising_forces, smooth_forces
-from .view import View
+from .view import Parts, View
 
 # least information of a knot, of that of all knots
 _ROUNDING = 1e-9
@@ -104,9 +105,9 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     ]
     # one force after the other: products between forces are not needed
     picked = chosen.picked(columns)
-    of = lambda force, asked: Evidence.of(view, picked + columns_of(view, basis_forces(view, force, FINE)), asked)
-    made = (of(force, asked) for force in weighed)
-    every = [_Weighed(found.products, found.length[len(columns) :], len(columns)) for found in made]
+    beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))
+    made = (Evidence.of(view, beside(force), asked) for force in weighed)
+    every = [_Weighed(found.products, found.length, len(columns)) for found in made]
     values = [each.values(each.held) for each in every]
     best = int(np.argmax([np.max(each) for each in values]))
     found, at = every[best], int(np.argmax(values[best]))
@@ -115,18 +116,27 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     # the prior standard deviation counts as one parameter, and every force is equally probable a priori
     alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
     heights, size, explained = found.heights(at)
+    predicts = found.predicts(view, beside(weighed[best]))
     force = dataclasses.replace(weighed[best], spread=float(f"{size:.6g}"))
     force, near = found.nearest(at, force, heights)
-    return Pattern(force, heights, near, p_value, found.predicts(of(weighed[best], asked[:1])), alone, explained)
+    return Pattern(force, heights, near, p_value, predicts, alone, explained)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Weighed:
-    """Products of the chosen columns, the first `count`, and of one force's hat functions of `length` (FINE,)."""
+    """Products of the chosen columns, the first `count`, and of one force's hat functions, in units of their lengths.
+
+    **Fields**: `unit`: (count + FINE,) the lengths.
+    """
 
     products: Sequence[Products]
-    length: np.ndarray
+    unit: np.ndarray
     count: int
+
+    @property
+    def length(self) -> np.ndarray:
+        """(FINE,) of the hat functions."""
+        return self.unit[self.count :]
 
     @property
     def held(self) -> list[int]:
@@ -159,18 +169,19 @@ class _Weighed:
         sums = products.sums(self.held, self.own, smooth.weights)
         return products.mixed(sums, products.known), sums, smooth
 
-    def predicts(self, evidence: Evidence) -> bool:
+    def predicts(self, view: View, columns: Columns) -> bool:
         """Whether the force improves the prediction of parts of the recordings, under the best disturbance of each.
 
-        `evidence` has the columns that the products are of: those of all forces would take much memory.
+        The products are of these `columns`: those of all forces would take much memory.
         """
-        with_it, without = zip(*(self._predicted(products, evidence) for products in self.products), strict=True)
+        whole = view.base + jax.tree.map(lambda column: column / self.unit, columns)
+        found = [self._predicted(products, view.products(whole, products.disturbance)) for products in self.products]
+        with_it, without = zip(*found, strict=True)
         return max(with_it) > max(without)
 
-    def _predicted(self, products: Products, evidence: Evidence) -> tuple[float, float]:
+    def _predicted(self, products: Products, parts: Parts) -> tuple[float, float]:
         """Log probability of the parts of the recordings by each other, with and without the force."""
         both, sums, _ = self.together(products)
-        parts = evidence.parts([*self.held, *self.own], products.disturbance)
         mixed = parts._replace(products=sums.T @ parts.products @ sums)
         few = products.known + self.count
         fewer = parts._replace(products=parts.products[:, :few, :few])

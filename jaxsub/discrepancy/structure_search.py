@@ -5,7 +5,6 @@ from collections.abc import Callable, Generator, Sequence
 
 from ..effects import AbstractEffect
 from ..errors import InputError
-from ..results import RESULTS
 from .acceptance import Examination, Model, ModelFitter, accept_proposed, proposed_effects
 from .cross_validation import compare
 from .evidence import evidence_of
@@ -65,7 +64,7 @@ def answers(
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
     # a simulation that cannot be fitted proposes nothing
-    told_ahead = not bool(baseline.fit.result == RESULTS.successful)
+    told_ahead = not baseline.fit.converged
     ahead = stepwise_by_innovations(fitter, baseline, vocabulary) if told_ahead else None
     if ahead is not None:
         return *ahead, None

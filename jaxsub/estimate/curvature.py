@@ -53,7 +53,7 @@ class Arrow(eqx.Module):
         """Of the coordinates that are not `held`; those stand alone, with a curvature of one."""
         shared, own = self._split(held)
         mixed = jnp.where(shared[:, None] | own[:, None, :], 0.0, self.mixed)
-        return Arrow(alone(self.among, shared), mixed, jax.vmap(alone)(self.own, own))
+        return Arrow(decoupled(self.among, shared), mixed, jax.vmap(decoupled)(self.own, own))
 
     def solve(self, vector: Float[Array, " d"], damping: Array) -> Float[Array, " d"]:
         """What it, with `damping` on its diagonal, takes to `vector`."""
@@ -103,7 +103,7 @@ class Spectrum(eqx.Module):
 
     def without(self, held: Bool[Array, " d"]) -> "Spectrum":
         """Of the coordinates that are not `held`; those stand alone, with a curvature of one."""
-        return Spectrum(*eigh(alone((self.vectors * self.values) @ self.vectors.T, held)))
+        return Spectrum(*eigh(decoupled((self.vectors * self.values) @ self.vectors.T, held)))
 
     def solve(self, vector: Float[Array, " d"], damping: Array) -> Float[Array, " d"]:
         """What |H|, with `damping` on its diagonal, takes to `vector`."""
@@ -125,7 +125,7 @@ class Spectrum(eqx.Module):
         return jnp.any(self.values < _NEGATIVE)
 
 
-def alone(matrix: Float[Array, "d d"], held: Bool[Array, " d"]) -> Float[Array, "d d"]:
+def decoupled(matrix: Float[Array, "d d"], held: Bool[Array, " d"]) -> Float[Array, "d d"]:
     """A matrix with ones on the diagonal, and zeros beside them, where coordinates are `held`."""
     return jnp.where(held[:, None] | held, jnp.diag(held.astype(matrix.dtype)), matrix)
 

@@ -18,7 +18,7 @@ from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .batches import batch
 from .blockwise import Descent, raced
-from .curvature import alone
+from .curvature import decoupled
 from .method import AbstractMethod, Passes, unwatched
 from .methods import filtered_first, gauss_newton
 from .problem import Problem
@@ -59,6 +59,11 @@ class Ended(eqx.Module):
         return {name: float(values[name]) for name in self.names}
 
     @property
+    def converged(self) -> bool:
+        """Whether the search ended at an optimum."""
+        return bool(self.result == RESULTS.successful)
+
+    @property
     def problem(self) -> Problem:
         """The least-squares problem of which this is the optimum."""
         start = self.start if self.known_start else None
@@ -81,11 +86,6 @@ class Fit(Ended):
     model: BlockLinearised
     gradient_norm: Float[Array, ""]
     pressed: Float[Array, " p"]
-
-    @property
-    def converged(self) -> bool:
-        """Whether the search ended at an optimum."""
-        return bool(self.result == RESULTS.successful)
 
     @property
     def at_bound(self) -> dict[str, str]:
@@ -199,7 +199,7 @@ def fit(
     runs = recordings if isinstance(recordings, Runs) else batch(vehicle, recordings)
     by = lambda method: _fitted(vehicle, runs, method, sigma, start, known_start, passes)
     found = by(method)
-    if method is None and not bool(found.result == RESULTS.successful) and not unfilterable(vehicle):
+    if method is None and not found.converged and not unfilterable(vehicle):
         found = min(found, by(filtered_first()), key=_improbable)
     return found
 
@@ -215,8 +215,10 @@ def _fitted(
 ) -> Fit:
     tell = passes or unwatched
     # one pass more, for the statistics
-    told = lambda done, expected: tell(done, expected + 1.0)
-    ended = search(vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start, passes=told)
+    with_statistics = lambda done, expected: tell(done, expected + 1.0)
+    ended = search(
+        vehicle, runs, method=method, sigma=sigma, start=start, known_start=known_start, passes=with_statistics
+    )
     taken = int(ended.steps)
     return evaluate(ended, lambda share: tell(taken + share, taken + 1.0))
 
@@ -234,9 +236,9 @@ def evaluate(ended: Ended, watch: Watch = nobody) -> Fit:
     problem = ended.problem
     model = BlockLinearised.of(ended.vehicle, ended.runs, ended.start, ended.sigma, problem.spread, watch)
     covariance, gradient, pressed, result = _statistics(problem, model.products, ended.result)
-    told = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
-    told["result"] = result
-    return Fit(**told, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
+    fields = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
+    fields["result"] = result
+    return Fit(**fields, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
 
 
 @eqx.filter_jit
@@ -252,7 +254,7 @@ def _statistics(
     away = standard_errors_away(information, gradient, room)
     pressed = jnp.where(is_pressed(information, room), jnp.sign(gradient), 0.0)
     # others' errors are for what presses on a bound held there; its own is the curvature's, which is no interval
-    covariance = inverse_information(alone(information, pressed != 0.0))
+    covariance = inverse_information(decoupled(information, pressed != 0.0))
     own = inverse_information(information)
     covariance = jnp.where(jnp.diag(pressed != 0.0), own, covariance)
     farthest = jnp.max(away, initial=0.0)
@@ -276,7 +278,7 @@ def standard_errors_away(
     What presses on a bound, with less `room` downhill than matters, stays.
     """
     pressed = is_pressed(information, room)
-    covariance = inverse_information(alone(information, pressed))
+    covariance = inverse_information(decoupled(information, pressed))
     step = jnp.abs(covariance @ jnp.where(pressed, 0.0, gradient))
     return step / jnp.sqrt(jnp.maximum(jnp.diag(covariance), 1e-300))
 

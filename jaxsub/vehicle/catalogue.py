@@ -1,8 +1,7 @@
 """Published vehicles, most of them linearised about their operating speed.
 
 Numbers are published ones; only the scaling to SI and the linearisation happen here. What the grammar of vehicle files
-says as it was published is a file in `published`. Sensor noise is that of a small
-AUV's usual suite (Doppler log 1 cm/s, MEMS rates 0.2 °/s, attitude 0.3 °, pressure depth 5 cm).
+says as it was published is a file in `published`. Sensor noise is that of a usual suite.
 """
 
 from pathlib import Path
@@ -11,11 +10,10 @@ from typing import Any
 from .mechanism import Mechanism
 from .read import read_vehicle, vehicle_from
 from .submerged_body import SubmergedBody
+from .usual_sensors import OUTPUTS
 
 _FORCES, _MOMENTS, _LINES, _TURNS = "XYZ", "KMN", "uvw", "pqr"
 _FINS = {"rudder": "delta_r", "elevator_right": "delta_er", "elevator_left": "delta_el"}
-_SIGMAS = {("u", "v", "w"): 0.01, ("p", "q", "r"): 0.0035, ("phi", "theta", "psi"): 0.005, ("z",): 0.05}
-_NOISE = {channel: {"sigma": sigma} for channels, sigma in _SIGMAS.items() for channel in channels}
 
 
 def dimensional(prime: dict[str, float], length: float, speed: float, density: float) -> dict[str, float]:
@@ -73,7 +71,7 @@ def nps_auv_ii() -> SubmergedBody:
         },
         "coefficients": _coefficients(values),
         "inputs": _FINS,
-        "outputs": _NOISE,
+        "outputs": OUTPUTS,
     })  # fmt: skip
 
 
@@ -108,7 +106,7 @@ def remus_100() -> SubmergedBody:
         },
         "coefficients": _coefficients(values),
         "inputs": {"rudder": "delta_r", "stern_plane": "delta_s"},
-        "outputs": _NOISE,
+        "outputs": OUTPUTS,
     })  # fmt: skip
 
 
@@ -151,7 +149,7 @@ def dsrv() -> SubmergedBody:
         },
         "coefficients": _coefficients(dimensional(prime, length, speed, density)),
         "inputs": {"stern_plane": "delta_s"},
-        "outputs": {name: _NOISE[name] for name in ("w", "q", "theta", "z")},
+        "outputs": {name: OUTPUTS[name] for name in ("w", "q", "theta", "z")},
     })  # fmt: skip
 
 

@@ -257,7 +257,7 @@ class Asked:
 
     def answer(self):
         """What is said, and whether there is something left to describe."""
-        fit = SimpleNamespace(result=self.result)
+        fit = SimpleNamespace(converged=bool(self.result == RESULTS.successful))
         _, said, left = self.search(silent(), Model(fit, None, None, ()), self.found(), None)
         return said, left is not None
 

@@ -11,6 +11,7 @@ from ...errors import InputError
 from ..inertia import twin
 from ..read import vehicle_from
 from ..submerged_body import SubmergedBody
+from ..usual_sensors import OUTPUTS
 from .sdf import Model, flag, number, numbers, parsed
 from .terms import CORIOLIS, FLIP, symbol
 
@@ -22,9 +23,6 @@ _OF_THRUSTER = (
     "namespace", "topic", "joint_name", "thrust_coefficient", "propeller_diameter", "fluid_density", "use_angvel_cmd",
     "max_thrust_cmd", "min_thrust_cmd", "velocity_control", "p_gain", "i_gain", "d_gain",
 )  # fmt: skip
-_SIGMAS = {
-    **dict.fromkeys("uvw", 0.01), **dict.fromkeys("pqr", 0.0035), "phi": 0.005, "theta": 0.005, "psi": 0.005, "z": 0.05
-}  # fmt: skip
 
 
 def read_sdf(path: str | Path) -> tuple[SubmergedBody, list[str]]:
@@ -53,7 +51,7 @@ def read_sdf(path: str | Path) -> tuple[SubmergedBody, list[str]]:
     data["model"] = {"coriolis": "rigid-body"}
     data["coefficients"] = _coefficients(plugin, where)
     data["inputs"], data["actuators"] = _thrusters(model, base, lost)
-    data["outputs"] = {channel: {"sigma": sigma} for channel, sigma in _SIGMAS.items()}
+    data["outputs"] = OUTPUTS
     vehicle = vehicle_from(data, where)
     assert isinstance(vehicle, SubmergedBody)
     return vehicle, lost

@@ -34,6 +34,6 @@ def auv(sizes: Sizes, columns: Columns) -> InitialFile:
             like = "rudder" if "rudder" in file.tables.get("actuators", {}) else ""
             file.put("actuators", name, fins.actuator(direction, like), "" if like else fins.slope.source)
         else:
-            fins.fix(file, upright=name == "rudder")
+            fins.fix(file, vertical=name == "rudder")
     put_outputs(file, columns, SUBMERGED)
     return file

@@ -11,6 +11,7 @@ from ...effects import CHANNEL_UNITS
 from ...errors import InputError
 from ...recording import Recording
 from ...units import si_unit
+from ..usual_sensors import SIGMAS
 
 # of channels that say the same, the first that there is
 _SAME = (("z", "depth"), ("r", "heading_rate"), ("u", "speed"), ("w", "depth_rate"))
@@ -22,10 +23,8 @@ _MEANT = {
     "gyro_y": "q", "gyro_z": "r", "acc_x": "ax", "acc_y": "ay", "acc_z": "az", "vx": "u", "vy": "v", "vz": "w",
 }  # fmt: skip
 _LISTED = 20  # columns that a line names
-# of a usual suite: Doppler log, MEMS gyros, attitude, pressure depth
-_SIGMAS = {
-    **dict.fromkeys("uvw", 0.01), **dict.fromkeys("pqr", 0.0035), "phi": 0.005, "theta": 0.005, "psi": 0.005, "z": 0.05
-}  # fmt: skip
+# names of a shaft speed's column, a pattern
+SHAFT = "n|rpm|rps|shaft|shaft_speed|prop|propeller|propeller_speed"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,7 +89,7 @@ class Columns:
     def outputs(self, moved: Sequence[str]) -> list[tuple[str, str]]:
         """Measured channels among those `moved`, each with its noise as TOML."""
         if self.log is None:
-            return [(channel, repr(sigma)) for channel, sigma in _SIGMAS.items() if channel in moved]
+            return [(channel, repr(sigma)) for channel, sigma in SIGMAS.items() if channel in moved]
         found = [name for name in self.log.columns if name in moved and self._fits(name)]
         if not found:
             what = f"has none of the channels {', '.join(moved)}"

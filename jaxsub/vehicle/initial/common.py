@@ -1,7 +1,7 @@
-"""Parts that the files of several kinds of vehicle have alike."""
+"""Parts that the files of several kinds of vehicle share."""
 
 from ...effects import GRAVITY
-from .columns import Columns, quoted
+from .columns import SHAFT, Columns, quoted
 from .file import Estimate, InitialFile, vector
 from .sizes import Sizes
 
@@ -22,7 +22,7 @@ def put_body(file: InitialFile, sizes: Sizes, inertia: tuple[float, float, float
 
 
 def put_speed(file: InitialFile, sizes: Sizes) -> None:
-    """The speed about which a vehicle that goes ahead is looked at; one that hovers has none."""
+    """The speed about which friction was estimated for a vehicle that goes ahead; one that hovers has none."""
     file.put("body", "speed", sizes.speed, "usual speed, at which friction was estimated")
 
 
@@ -42,7 +42,7 @@ def put_thrust(file: InitialFile, columns: Columns, sizes: Sizes, drag: Estimate
     command, or the constant, is as much as the `drag` (N/(m/s)²) at the usual speed.
     """
     needed = drag.value * sizes.speed**2
-    propeller = r"n|rpm|rps|shaft|shaft_speed|prop|propeller|propeller_speed|motor|thruster|throttle|thrust|force|t"
+    propeller = f"{SHAFT}|motor|thruster|throttle|thrust|force|t"
     if command := columns.take(propeller, ["rad/s"], stated=True):
         file.put("inputs", "shaft_speed", quoted(command, ""), "rad/s")
         file.add(Estimate.within(1.0, needed / command.largest**2, "drag at the usual speed by the largest n"), "X_nn")

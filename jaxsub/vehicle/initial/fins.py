@@ -84,12 +84,12 @@ class Fins:
         line = f"position = {vector(self.place, 0.0, 0.0)}, direction = {vector(*direction)}"
         return f'{{ kind = "fin", {line}, area = {area}, lift_slope = {slope} }}'
 
-    def fix(self, file: InitialFile, upright: bool) -> None:
-        """Add the derivatives of the pair without a deflection, `upright` as a rudder is."""
+    def fix(self, file: InitialFile, vertical: bool) -> None:
+        """Add the derivatives of the pair without a deflection, `vertical` as a rudder is."""
         part = self.slope.std / self.slope.value
         slope, arm, square = (self.lift * self.place**power for power in range(3))
         source = "lift of the fixed fins"
-        names = ("Y_uv", "Y_ur", "N_uv", "N_ur") if upright else ("Z_uw", "Z_uq", "M_uw", "M_uq")
-        sign = 1.0 if upright else -1.0
+        names = ("Y_uv", "Y_ur", "N_uv", "N_ur") if vertical else ("Z_uw", "Z_uq", "M_uw", "M_uq")
+        sign = 1.0 if vertical else -1.0
         for name, value in zip(names, (slope, sign * arm, sign * arm, square), strict=True):
             file.add(Estimate.within(part, -value, source), name)

@@ -5,7 +5,7 @@ import math
 
 from ...effects import GRAVITY
 from ..geometry import added_inertia_factors, added_mass_factors, crossflow_drag, friction_drag
-from .columns import Columns, quoted
+from .columns import SHAFT, Columns, quoted
 from .common import SURFACE, put_body, put_outputs, put_speed
 from .file import Estimate, InitialFile, number, vector
 from .sizes import Kind, Sizes
@@ -40,7 +40,7 @@ def ship(sizes: Sizes, columns: Columns) -> InitialFile:
     block = sizes.displaced / (sizes.length * sizes.beam * sizes.draught)
     hull = Hull(sizes.length, sizes.beam, sizes.draught, block)
     file = _begun("Ship", sizes, hull, residual=1.3)
-    shaft = columns.take("n|rpm|rps|shaft|shaft_speed|prop|propeller|propeller_speed", ["rad/s"], stated=True)
+    shaft = columns.take(SHAFT, ["rad/s"], stated=True)
     wake = 0.5 * block - 0.05
     if columns.log is None or shaft:
         file.put("inputs", "shaft_speed", quoted(shaft, "n"), "rad/s")

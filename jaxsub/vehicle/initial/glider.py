@@ -8,7 +8,7 @@ from .sizes import Kind, Sizes
 from .slender import add_hull, add_water, put_slender
 
 GLIDER = Kind("a glider", ("diameter",), ("fin_span", "fin_chord"), speed=0.35)
-# of a wing by the length, and of the upright tail by the diameter, as the Slocum has them
+# of a wing by the length, and of the vertical tail by the diameter, as the Slocum has them
 _WING, _TAIL = (0.27, 0.065, -0.1), (0.5, 0.7, -0.5)
 # part of the mass that moves, as the Slocum's battery does
 _MOVED = 0.2
@@ -24,7 +24,7 @@ def glider(sizes: Sizes, columns: Columns) -> InitialFile:
     tail = Fins(_TAIL[0] * diameter, _TAIL[1] * diameter, 0.3 * diameter, _TAIL[2] * length, sizes.density, False)
     add_water(file, sizes, tail, wings)
     add_hull(file, sizes, tail, wings)
-    wings.fix(file, upright=False)
+    wings.fix(file, vertical=False)
     forward = Estimate.within(0.5, wings.lift * (1.0 - wings.induced), "lift of the wings, tilted, less induced drag")
     file.add(forward, "X_ww")
     _put_engine(file, columns, sizes)
@@ -33,7 +33,7 @@ def glider(sizes: Sizes, columns: Columns) -> InitialFile:
         file.put("inputs", "rudder", quoted(rudder, "delta_r"), "rad")
         file.put("actuators", "rudder", tail.actuator((0.0, 1.0, 0.0)), tail.slope.source)
     else:
-        tail.fix(file, upright=True)
+        tail.fix(file, vertical=True)
     put_outputs(file, columns, SUBMERGED)
     return file
 
