@@ -30,11 +30,12 @@ _SET = (0.8, 0.6)
 
 
 def _current(a, m):
-    """Drag on the velocity through the water: what a steady stream of `a` m/s takes from that over ground."""
+    """Water that flows with `a` m/s: damping of the velocity through it, and inertia as it turns in the body's axes."""
     north, east = over_ground(m)
-    stream = jnp.concatenate([a * (_SET[0] * north + _SET[1] * east), jnp.zeros(3)])
+    stream, turning = a * (_SET[0] * north + _SET[1] * east), jnp.stack([m.rates[e] for e in ("roll", "pitch", "yaw")])
     names = ("surge", "sway", "heave", "roll", "pitch", "yaw")
-    return dict(zip(names, -m.damping @ stream, strict=True))
+    more = m.motion.inertia[:, :3] @ jnp.cross(stream, turning) - m.damping[:, :3] @ stream
+    return dict(zip(names, more, strict=True))
 
 
 def _wave(equation: str, omega: float, limit: float) -> Truth:

@@ -11,8 +11,10 @@ from jaxtyping import Array
 
 from ..arrays import Values, quietly
 from ..effects import (
+    EQUATIONS,
     AbstractActuator,
     AbstractEffect,
+    AbstractFlow,
     AbstractForce,
     AbstractInstrument,
     AbstractMemory,
@@ -28,6 +30,8 @@ from ..simulate import Trajectory
 from ..vehicle import AbstractVehicle
 from .view import View
 
+# amplitude of an effect by which its slope is taken, SI: effects are linear in theirs, some only about zero
+_SMALL = 1e-3
 # by how much a shape such as a lag is moved to see which way the data would have it
 _NUDGE = 0.1
 # forces of which columns are made at once
@@ -37,8 +41,8 @@ _AT_ONCE = 64
 def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple[Columns, list[list[int]]]:
     """The columns of all candidates, and which of them each candidate has.
 
-    An effect with amplitudes has a column for each. One with none, such as a lag, enters as the whole difference that
-    it makes at its grid value, and the difference that a little more of it would make.
+    An effect with amplitudes has a column for each, its slope at zero. One with none, such as a lag, enters as the
+    whole difference that it makes at its grid value, and the difference that a little more of it would make.
     """
     made = _effect_columns(view, candidates)
     shows = [isinstance(effect, AbstractInstrument) for effect in candidates]
@@ -72,13 +76,14 @@ def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[
     for effect in effects:
         names = amplitudes(effect)
         more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
-        units = [with_numbers(effect, {name: float(name == own) for name in names}) for own in names]
-        tried.append(units or [effect, with_numbers(effect, more)])
+        small = [with_numbers(effect, {name: _SMALL * (name == own) for name in names}) for own in names]
+        tried.append(small or [effect, with_numbers(effect, more)])
     made = iter(differences(view, [one for own in tried for one in own]))
     columns = []
     for effect, own in zip(effects, tried, strict=True):
         found = [next(made) for _ in own]
-        columns.append(found if amplitudes(effect) else [found[0], (found[1] - found[0]) / _NUDGE])
+        slopes = [column / _SMALL for column in found]
+        columns.append(slopes if amplitudes(effect) else [found[0], (found[1] - found[0]) / _NUDGE])
     return columns
 
 
@@ -93,6 +98,8 @@ def differences(view: View, effects: Sequence[AbstractEffect]) -> list[np.ndarra
     def added(effect: AbstractEffect) -> np.ndarray:
         if isinstance(effect, AbstractActuator):
             return next(forces)
+        if isinstance(effect, AbstractFlow):
+            return flow_force(vehicle, path, effect)
         if isinstance(effect, AbstractForce):
             ends = next(remembered) if isinstance(effect, AbstractMemory) else (path.start, path.end)
             return np.stack([stacked_force(vehicle, effect, motion) for motion in ends])
@@ -112,6 +119,17 @@ def stacked_force(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motio
     parts = plain.force(motion)
     like = motion.rates[vehicle.layout.equations[0]]
     return np.stack([np.broadcast_to(parts.get(e, 0.0), like.shape) for e in vehicle.layout.equations], axis=-1)
+
+
+def flow_force(vehicle: AbstractVehicle, path: Trajectory, effect: AbstractFlow) -> np.ndarray:
+    """What the moving water of an effect changes of the vehicle's force, at both ends of each interval."""
+    plain, added = jax.tree.map(np.asarray, effect), []
+    for motion in (path.start, path.end):
+        before = motion.water or dict.fromkeys(EQUATIONS[:3], 0.0 * motion.rates["surge"])
+        after = {e: before[e] + part for e, part in zip(before, plain.water(motion.positions), strict=True)}
+        still, moved = (_force(vehicle, dataclasses.replace(motion, water=water)) for water in (before, after))
+        added.append(np.asarray(moved) - np.asarray(still))
+    return np.stack(added)
 
 
 def actuator_forces(

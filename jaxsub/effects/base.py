@@ -18,7 +18,7 @@ from .motion import EQUATIONS, Facts, Motion, Signal
 
 
 def amplitude(unit: str, sign: int = 0, default: float = 0.0, most: float = math.inf) -> Any:
-    """A field that the effect is linear in, of a size that physics admits up to `most`.
+    """A field that the effect is linear in about zero, of a size that physics admits up to `most`.
 
     `sign` +1 or -1 is the only one that it admits; 0 admits both.
     """
@@ -107,6 +107,17 @@ class AbstractForce(AbstractEffect):
     def term(self) -> str:
         """The name of what a vehicle's own equations may contain that makes this effect superfluous (`Facts.has`)."""
         return ""
+
+
+class AbstractFlow(AbstractEffect):
+    """An effect that moves the water about a body, whose forces of the water all follow its velocity through it.
+
+    It is linear in its amplitudes to first order only.
+    """
+
+    @abc.abstractmethod
+    def water(self, positions: Mapping[str, Signal]) -> tuple[Signal, Signal, Signal]:
+        """Velocity of the water in body axes (m/s) at the attitude and place `positions`."""
 
 
 class AbstractDerivative(AbstractForce):

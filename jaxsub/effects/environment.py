@@ -9,20 +9,18 @@ from jaxtyping import Array
 
 from ..arrays import namespace
 from ..parameters import number
-from .base import AbstractForce, amplitude, shape
-from .motion import EQUATIONS, FORCES, Facts, Motion, Signal, unit_per
+from .base import AbstractFlow, AbstractForce, amplitude, shape
+from .motion import FORCES, Facts, Motion, Signal, unit_per
 
 # s
 _LONGEST_PERIOD = 30.0
 
 
-class Current(AbstractForce):
+class Current(AbstractFlow):
     r"""A steady horizontal current $V_N, V_E$ (m/s, over ground, of either sign), where velocities are over ground.
 
-    In body axes $v_c = R(\phi,\theta,\psi)^T[V_N\,V_E\,0]$, and damping feels the water and not the ground:
-    $\tau = -A\,[v_c\,0]$ with the derivatives by u, v and w, linear about the operating speed. What grows with the
-    square of the velocity, and the added mass of water that turns past the body, are left out. A recorded current
-    (`[environment]`) has them. Source: Fossen (2021), §10.3.
+    In body axes $v_c = R(\phi,\theta,\psi)^T[V_N\,V_E\,0]$; all forces of the water follow $\nu - [v_c\,0]$, as
+    where a current is recorded (`[environment]`). Source: Fossen (2021), §10.3.
     """
 
     name: ClassVar[str] = "current"
@@ -44,14 +42,12 @@ class Current(AbstractForce):
 
     @property
     def expression(self) -> str:
-        """The force."""
-        return "-A Rᵀ [V_N, V_E, 0]"
+        """The velocity through the water."""
+        return "τ(ν - Rᵀ [V_N, V_E, 0])"
 
-    def force(self, motion: Motion) -> dict[str, Signal]:
-        """What the damping of the water's own velocity takes away."""
-        u, v, w = stream(motion.positions, self.V_N, self.V_E)
-        rows = {e: motion.damping[EQUATIONS.index(e)] for e in self.equations}
-        return {e: -(row[0] * u + row[1] * v + row[2] * w) for e, row in rows.items()}
+    def water(self, positions: Mapping[str, Signal]) -> tuple[Signal, Signal, Signal]:
+        """The current in body axes."""
+        return stream(positions, self.V_N, self.V_E)
 
 
 def stream(positions: Mapping[str, Signal], north: Signal, east: Signal) -> tuple[Signal, Signal, Signal]:

@@ -59,7 +59,6 @@ class Motion(eqx.Module):
     - `inertia`: (n, n) mass matrix of the equations in `rates`.
     - `buoyancy`: displaced weight (N); zero for a mechanism.
     - `cruise`: the operating speed U_c (m/s) about which linear coefficients were taken.
-    - `damping`: (n, n) linear damping of the equations in `rates`; times a velocity it is a force.
     - `time`: s from the run's own start.
     - `accelerations`: rates of the free equations' velocities, where an accelerometer needs them.
     - `water`: velocity of the water over ground in body axes (m/s), by the equation of the body's own; absent at rest.
@@ -73,7 +72,6 @@ class Motion(eqx.Module):
     inertia: Float[Signal, "n n"]
     buoyancy: Signal | float
     cruise: Signal | float
-    damping: Float[Signal, "n n"]
     time: Signal | float = 0.0
     accelerations: dict[str, Signal] = eqx.field(default_factory=dict)
     water: dict[str, Signal] = eqx.field(default_factory=dict)

@@ -9,7 +9,14 @@ from ..errors import InputError
 from .actuator_curves import ActuatorDeadband, ActuatorMisalignment, ActuatorSaturation, ControlSurfaceStall
 from .actuator_gain import ActuatorGain
 from .actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
-from .base import AbstractActuator, AbstractDerivative, AbstractEffect, AbstractForce, AbstractInstrument
+from .base import (
+    AbstractActuator,
+    AbstractDerivative,
+    AbstractEffect,
+    AbstractFlow,
+    AbstractForce,
+    AbstractInstrument,
+)
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
 from .derivative import Derivative
 from .environment import Current, WaveForcing
@@ -125,7 +132,8 @@ def from_script(path: str | Path) -> tuple[type[AbstractEffect], ...]:
 
 def is_effect(kind: object) -> bool:
     """Whether `kind` is a force, an actuator's or a sensor's effect that can be made, with a name and a family."""
-    if not (inspect.isclass(kind) and issubclass(kind, AbstractForce | AbstractActuator | AbstractInstrument)):
+    sorts = AbstractForce | AbstractFlow | AbstractActuator | AbstractInstrument
+    if not (inspect.isclass(kind) and issubclass(kind, sorts)):
         return False
     named = isinstance(getattr(kind, "name", None), str) and isinstance(getattr(kind, "family", None), str)
     return named and not inspect.isabstract(kind)

@@ -13,6 +13,7 @@ from ..effects import (
     VELOCITIES,
     AbstractActuator,
     AbstractEffect,
+    AbstractFlow,
     AbstractForce,
     AbstractInstrument,
     Derivative,
@@ -152,6 +153,8 @@ def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
             raise InputError(place, f"{effect.label} is there twice", "delete one")
         if isinstance(effect, AbstractForce):
             _check_force(effect, vehicle, place)
+        if isinstance(effect, AbstractFlow) and not isinstance(vehicle, SubmergedBody):
+            raise InputError(place, f"moves water, which a {layout.kind} is not in", "delete it")
         if isinstance(effect, AbstractActuator) and effect.actuator not in dict(layout.inputs):
             hint = nearest(effect.actuator, [n for n, _ in layout.inputs]) or "an actuator of [inputs]"
             raise InputError(place, f"no actuator {effect.actuator}", f"use {hint}")

@@ -58,9 +58,8 @@ class Mechanism(AbstractVehicle):
         environment = [name for name, _ in (*self.layout.prescribed, *self.layout.environment)]
         actuators = dict(zip(names, columns[: len(names)], strict=True))
         surroundings = dict(zip(environment, columns[len(names) :], strict=True))
-        inertia, damping = self.mass_matrix(), self.damping_matrix()
         return Motion(
-            rates, positions, actuators, surroundings, inertia, 0.0, 0.0, damping, time,
+            rates, positions, actuators, surroundings, self.mass_matrix(), 0.0, 0.0, time,
             actuation=RigActuation(self._drives),
         )  # fmt: skip
 

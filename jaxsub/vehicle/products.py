@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from ..effects import EQUATIONS, INPUT_SYMBOLS, Derivative, Motion, Power, Signal, derivative
+from ..effects import INPUT_SYMBOLS, Derivative, Motion, Power, Signal, derivative
 
 ACTUATORS = tuple(INPUT_SYMBOLS)
 _THRUST = Derivative("surge", (Power("thrust"),))
@@ -47,31 +47,10 @@ class Products(eqx.Module):
             terms[_THRUST.name] = _THRUST
         return {symbol: term for symbol, term in terms.items() if name in term.through(inputs)}
 
-    def slopes(self, cruise: Signal) -> list[tuple[str, str, Signal]]:
-        """Equation, equation of the velocity, and slope of each force that the velocity has at the speed `cruise`."""
-        found = []
-        for name, term in derivatives(self.coefficients).items():
-            ahead = [power for power in term.powers if power.variable in ("surge", "speed")]
-            others = [power for power in term.powers if power not in ahead]
-            scale, count = self.coefficients[name] * term.sign, sum(power.power for power in ahead)
-            if not others and ahead:
-                found.append((term.equation, "surge", scale * count * abs(cruise) ** (count - 1)))
-            elif len(others) == 1 and others[0].variable in EQUATIONS and others[0] == Power(others[0].variable):
-                found.append((term.equation, others[0].variable, _at(ahead, cruise, scale)))
-        return found
-
     @property
     def damp(self) -> bool:
         """Whether any of them follows a velocity."""
         return any(term.moved for term in derivatives(self.coefficients).values())
-
-
-def _at(powers: Iterable[Power], cruise: Signal, scale: Signal) -> Signal:
-    """`scale` times the powers of surge and speed at the speed `cruise`."""
-    for power in powers:
-        speed = abs(cruise) + 1e-6 * (power.power < 0) if power.variable == "speed" else cruise
-        scale = scale * power.of(speed)
-    return scale
 
 
 def derivatives(names: Iterable[str]) -> dict[str, Derivative]:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..arrays import Values
-from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, Motion, Signal, coriolis, stream
+from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, AbstractFlow, Motion, Signal, coriolis, stream
 from ..parameters import number
 from .actuation import BodyActuation
 from .actuators import Actuators, stage_numbers
@@ -103,15 +103,10 @@ class SubmergedBody(AbstractVehicle):
         environment = pick("environment ")
         buoyancy = self.restoring.buoyancy(environment)
         positions = {name: known.get(name, zero) for name in (*_POSITIONS, *self.layout.positions)}
-        inertia, damping = self.inertia.matrix(), self._damping()
-        slopes = self.products.slopes(self.cruise)
-        places = [(EQUATIONS.index(row), EQUATIONS.index(column), value) for row, column, value in slopes]
-        if places := [*places, *self.actuators.damping(self.cruise)]:
-            damping = damping + sparse(places)
-        water: dict[str, Signal] = dict(zip(EQUATIONS, _water(positions, environment, zero), strict=False))
+        water = self._water(positions, environment, zero)
         return Motion(
-            rates, positions, pick("input "), environment, inertia, buoyancy, self.cruise, damping, time, water=water,
-            actuation=self._actuation,
+            rates, positions, pick("input "), environment, self.inertia.matrix(), buoyancy, self.cruise, time,
+            water=water, actuation=self._actuation,
         )  # fmt: skip
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
@@ -199,14 +194,17 @@ class SubmergedBody(AbstractVehicle):
         turned = jnp.cross(moving, turning)
         return turned @ self.inertia.matrix()[:, :3].T - moving @ self._damping()[:, :3].T
 
+    def _water(
+        self, positions: Mapping[str, Signal], environment: Mapping[str, Signal], still: Signal
+    ) -> dict[str, Signal]:
+        """Velocity of the water in body axes (m/s), recorded and by effects; nothing where there is neither."""
+        recorded = [environment.get(name) for name in CURRENT]
+        flows = [effect.water(positions) for effect in self.effects if isinstance(effect, AbstractFlow)]
+        if any(part is not None for part in recorded):
+            north, east = (still if part is None else part for part in recorded)
+            flows.append(stream(positions, north, east))
+        return {e: sum(parts, still) for e, *parts in zip(EQUATIONS, *flows, strict=False)} if flows else {}
+
     def _free(self, matrix: Float[Values, "6 6"]) -> Float[Values, "n n"]:
         rows = [EQUATIONS.index(e) for e in self.layout.equations]
         return matrix[np.ix_(rows, rows)]
-
-
-def _water(positions: Mapping[str, Signal], environment: Mapping[str, Signal], still: Signal) -> tuple[Signal, ...]:
-    """Velocity of the water in body axes (m/s); none where no current is recorded."""
-    north, east = (environment.get(name) for name in CURRENT)
-    if north is None and east is None:
-        return ()
-    return stream(positions, still if north is None else north, still if east is None else east)

@@ -82,6 +82,6 @@ def test_knots_of_a_smooth_force_are_among_the_fine_ones():
     force = SmoothForce("heave", "z", -1.0, 4.0, **{f"a_{j}": jnp.asarray(a) for j, a in enumerate(heights)})
     z = rng.uniform(-1.0, 4.0, 50)
     still = {name: jnp.zeros(50) for name in ("surge", "sway", "heave", "roll", "pitch", "yaw")}
-    motion = Motion(still, {"z": jnp.asarray(z)}, {}, {}, np.eye(6), 0.0, 1.0, np.zeros((6, 6)))
+    motion = Motion(still, {"z": jnp.asarray(z)}, {}, {}, np.eye(6), 0.0, 1.0)
     expected = hat_matrix((z + 1.0) / 5.0, FINE) @ coarse() @ heights
     np.testing.assert_allclose(force.force(motion)["heave"], expected, atol=1e-6)

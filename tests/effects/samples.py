@@ -51,7 +51,7 @@ def motion(known, count=40, cruise=1.2, seed=1):
     actuators, memories = draw(known.actuators), [f"{kind}_{e}" for e in equations for kind in ("memory", "hysteresis")]
     return Motion(
         rates, positions | draw(memories), actuators, surroundings, inertia, 500.0 if body else 0.0,
-        cruise if body else 0.0, jnp.asarray(-root @ root.T), jnp.linspace(0.0, 60.0, count), draw(known.equations),
+        cruise if body else 0.0, jnp.linspace(0.0, 60.0, count), draw(known.equations),
         actuation=Quadratic(),
     )  # fmt: skip
 
@@ -61,7 +61,7 @@ def still(now):
     zero = lambda named: {name: 0.0 * value for name, value in named.items()}
     return Motion(
         zero(now.rates), zero(now.positions), zero(now.actuators), now.environment, now.inertia, now.buoyancy, 0.0,
-        now.damping, now.time, zero(now.accelerations), actuation=now.actuation,
+        now.time, zero(now.accelerations), actuation=now.actuation,
     )  # fmt: skip
 
 

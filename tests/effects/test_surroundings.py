@@ -38,19 +38,10 @@ def attitude():
     return Rotation.from_euler("ZYX", angles)
 
 
-def test_current_is_felt_by_linear_damping_as_the_velocity_of_the_water():
-    found = Current(EQUATIONS, one(0.4), one(-0.3)).force(NOW)
-    water = attitude().inv().apply([0.4, -0.3, 0.0])
-    expected = -np.concatenate([water, np.zeros((60, 3))], 1) @ np.asarray(NOW.damping).T
-    np.testing.assert_allclose(np.stack([found[e] for e in EQUATIONS], 1), expected, rtol=1e-10, atol=1e-12)
-
-
-def test_a_body_that_drifts_with_the_current_feels_no_damping():
-    """Σ of damping and current is zero where the velocity over ground is the water's."""
-    water = attitude().inv().apply([0.4, -0.3, 0.0])
-    damping = np.concatenate([water, np.zeros((60, 3))], 1) @ np.asarray(NOW.damping).T
-    found = Current(EQUATIONS, one(0.4), one(-0.3)).force(NOW)
-    np.testing.assert_allclose(damping + np.stack([found[e] for e in EQUATIONS], 1), 0.0, atol=1e-10)
+def test_current_flows_in_the_axes_of_the_body():
+    found = Current(EQUATIONS, one(0.4), one(-0.3)).water(NOW.positions)
+    expected = attitude().inv().apply([0.4, -0.3, 0.0])
+    np.testing.assert_allclose(np.stack(found, 1), expected, rtol=1e-10, atol=1e-12)
 
 
 def test_wave_is_a_sine_of_the_runs_time():

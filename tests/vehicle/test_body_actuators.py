@@ -257,17 +257,6 @@ def test_recorded_density_is_that_of_the_water_and_else_the_reference_density():
     np.testing.assert_allclose(two, 1.03 * one, rtol=1e-12)
 
 
-def test_fin_s_slopes_are_in_the_damping_by_which_a_current_acts():
-    """Claim: about the operating speed the damping that a motion carries is the Jacobian of the fin's force."""
-    fin = {"kind": "fin", "position": PLACE, "direction": ACROSS, "derivative": 9.6}
-    vehicle = hull({"a": fin}, {"a": "a"}, body={"mass": 60.0, "inertia": [1.0, 12.0, 13.0], "speed": 1.5})
-    state = jnp.zeros(len(vehicle.layout.states)).at[0].set(1.5)
-    motion = lambda nu: vehicle.motion(state.at[:6].set(nu), jnp.zeros(1))
-    force = lambda nu: jnp.stack([vehicle.actuators.force(motion(nu)).get(e, 0.0) for e in EQUATIONS])
-    slopes = motion(state[:6]).damping - vehicle.damping.matrix(vehicle.inertia.rigid, vehicle.cruise)
-    np.testing.assert_allclose(slopes, jax.jacfwd(force)(state[:6]), rtol=1e-12, atol=1e-12)
-
-
 # x and y of a thruster, its direction in the horizontal plane, and of the vertical ones
 HORIZONTAL = {"t1": (0.16, 0.11, 1, -1), "t2": (0.16, -0.11, 1, 1), "t3": (-0.16, 0.11, 1, 1),
               "t4": (-0.16, -0.11, 1, -1)}  # fmt: skip

@@ -226,30 +226,3 @@ def test_an_input_that_acts_through_a_product_alone_is_not_idle():
     assert not [one for one in vehicle_findings(body(), "b") if one.check == "idle-input" and "rudder" in one.where]
     vehicle = hull({"N_uu_delta_r": -1.0, "Z_uu_delta_e": -1.0, "X_nn": 1e-3})
     assert not [one for one in vehicle_findings(vehicle, "hull.toml") if one.check == "idle-input"]
-
-
-def test_damping_that_a_motion_carries_has_the_slopes_of_the_products():
-    """Claim: about the operating speed it is the Jacobian of all forces of the water, by which a current acts."""
-    names = (
-        "X_u|u|",
-        "X_uu",
-        "Y_uv",
-        "Y_uur",
-        "Y_v|v|",
-        "N_u|u|v",
-        "N_vr",
-        "M_uq",
-        "K_p",
-        "Z_w",
-        "N_uu_delta_r",
-        "X_u",
-        "X_UU",
-        "Y_Ur",
-        "Y_Uuv",
-        "N_vvr/U",
-    )
-    vehicle = hull({name: -1.0 - 0.3 * i for i, name in enumerate(names)})
-    state = jnp.zeros(6 + len(vehicle.layout.positions)).at[0].set(1.5)
-    damping = vehicle.motion(state, jnp.zeros(4)).damping
-    force = lambda nu: vehicle.force(vehicle.motion(state.at[:6].set(nu), jnp.zeros(4))) + vehicle.damping_matrix() @ nu
-    np.testing.assert_allclose(damping, jax.jacfwd(force)(state[:6]), rtol=1e-12, atol=1e-12)

@@ -9,6 +9,7 @@ import pytest
 from rigs import driven, stacked
 
 from jaxsub.errors import InputError
+from jaxsub.effects import EQUATIONS, Current, QuadraticDamping
 from jaxsub.simulate import at_rest, simulate
 from jaxsub.vehicle import vehicle_from, vehicle_text
 
@@ -122,6 +123,24 @@ def test_accelerations_in_a_current_are_those_of_fossens_equations():
     found = vehicle.acceleration(jnp.asarray(table), jnp.asarray(streams))
     expected = [fossen(a, b, (*c, 0.0)) for a, b, c in zip(nu, attitude, streams, strict=True)]
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("choice", ["linear", "full"])
+def test_a_current_of_an_effect_is_one_of_a_recording(choice):
+    """Claim: accelerations are those with constant columns; with both, those with their sum; all other forces follow."""
+    columns = {"current_north": "V_N", "current_east": "V_E"}
+    drag = QuadraticDamping("sway", jnp.asarray(-60.0))
+    recorded = vehicle_from(tree(choice, environment=columns), "hull.toml").with_effect(drag)
+    still = vehicle_from(tree(choice), "hull.toml").with_effect(drag)
+    table = jnp.asarray(states(still, seed=3)[0])
+    streams = lambda north, east: jnp.broadcast_to(jnp.array([north, east]), (len(table), 2))
+    current = lambda north, east: Current(EQUATIONS, jnp.asarray(north), jnp.asarray(east))
+    expected = recorded.acceleration(table, streams(0.4, -0.3))
+    alone = still.with_effect(current(0.4, -0.3)).acceleration(table, jnp.zeros((len(table), 0)))
+    both = recorded.with_effect(current(0.3, 0.1)).acceleration(table, streams(0.1, -0.4))
+    assert np.max(abs(expected - recorded.acceleration(table, streams(0.0, 0.0)))) > 0.01
+    np.testing.assert_allclose(alone, expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(both, expected, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("choice", ["linear", "full"])

@@ -82,10 +82,6 @@ class Actuator(eqx.Module):
         """Whether its force follows the velocity of the body."""
         return False
 
-    def damping(self, cruise: Signal) -> list[Load]:
-        """Slopes of its force by velocities at the speed `cruise`: for each line w, s of $-s\\,w w^T$."""
-        return []
-
     def command(self, motion: Motion) -> Signal:
         """The weighted sum of its inputs within the limits."""
         parts = [motion.actuators[name] if w == 1.0 else w * motion.actuators[name] for name, w in self.input]
@@ -118,14 +114,6 @@ class Actuators(eqx.Module):
         # one product for all: each operation is traced in every use of the model
         total = sizes @ lines.astype(sizes.dtype)
         return {e: total[..., i] for i, e in enumerate(EQUATIONS) if np.any(lines[:, i])}
-
-    def damping(self, cruise: Signal) -> list[tuple[int, int, Signal]]:
-        """Row, column and slope of the forces by velocities, at the speed `cruise` and no command."""
-        found = []
-        for size, line in (load for item in self.items for load in item.damping(cruise)):
-            rows = np.flatnonzero(line)
-            found += [(int(i), int(j), -size * float(line[i] * line[j])) for i in rows for j in rows]
-        return found
 
     def values(self) -> dict[str, Array]:
         """Every number by its name in the vehicle, such as `bow.gain`."""

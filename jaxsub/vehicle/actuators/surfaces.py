@@ -89,10 +89,6 @@ class Fin(Actuator):
             found.append((half * self.numbers["drag"] * (ahead * delta) ** 2, astern))
         return found
 
-    def damping(self, cruise: Signal) -> list[Load]:
-        """Of the lift by the velocity along the fin's direction."""
-        return [(self._slope(self.density) * abs(cruise), line(self.position, self.direction))] if self.inflow else []
-
     def _slope(self, density: Signal | float) -> Any:
         gain = self.value("gain", 1.0)
         if "derivative" in self.numbers:
