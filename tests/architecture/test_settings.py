@@ -28,8 +28,8 @@ ALLOWED = {
         "view.py": {"_DOUBTED", "_QUIET", "_LEAST_WHITE"},
     },
     "is the resolution of a grid, a difference or a random test": {
-        "columns.py": {"_NUDGE", "_SMALL", "_AT_ONCE"}, "spline_basis.py": {"_CHOOSING"}, "multiplicity.py": {"_DRAWS", "_SEED"},
-        "process_noise.py": {"_SEED"}, "regime.py": {"_SHIFTS"},
+        "columns.py": {"_NUDGE", "_SMALL", "_AT_ONCE"}, "spline_basis.py": {"_CHOOSING"},
+        "multiplicity.py": {"_DRAWS", "_SEED"}, "process_noise.py": {"_SEED"}, "regime.py": {"_SHIFTS"},
         "smoothness.py": {"FINE", "_SIZES"}, "tones.py": {"_LINES"}, "validation.py": {"_DELAYS"},
     },
     "designs the next manoeuvre, after the verdict": {

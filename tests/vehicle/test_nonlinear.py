@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from rigs import driven, stacked
 
-from jaxsub.errors import InputError
 from jaxsub.effects import EQUATIONS, Current, QuadraticDamping
+from jaxsub.errors import InputError
 from jaxsub.simulate import at_rest, simulate
 from jaxsub.vehicle import vehicle_from, vehicle_text
 
@@ -127,7 +127,7 @@ def test_accelerations_in_a_current_are_those_of_fossens_equations():
 
 @pytest.mark.parametrize("choice", ["linear", "full"])
 def test_a_current_of_an_effect_is_one_of_a_recording(choice):
-    """Claim: accelerations are those with constant columns; with both, those with their sum; all other forces follow."""
+    """Claim: accelerations are those with constant columns, and with both those with their sum; effects follow too."""
     columns = {"current_north": "V_N", "current_east": "V_E"}
     drag = QuadraticDamping("sway", jnp.asarray(-60.0))
     recorded = vehicle_from(tree(choice, environment=columns), "hull.toml").with_effect(drag)
