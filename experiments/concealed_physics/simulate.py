@@ -96,7 +96,7 @@ def _shown(vehicle: AbstractVehicle, truths: tuple[Truth, ...], sizes: Array, st
     held = jnp.concatenate([commands, commands[-1:]])
     surroundings = jnp.zeros((len(t), len(vehicle.layout.environment)))
     motion = vehicle.motion(state, jnp.concatenate([held, surroundings, t[:, None]], axis=1))
-    channels = {c: jnp.broadcast_to(y, t.shape) for c, y in vehicle.channels(motion, {}).items()}
+    channels = {c: jnp.broadcast_to(y, t.shape) for c, y in vehicle.channels(motion).items()}
     for truth, size in zip(truths, sizes, strict=True):
         if truth.sense is not None:
             channels |= truth.sense(size, t, channels)

@@ -18,7 +18,8 @@ class Channel:
 
     **Fields**
 
-    - `name`: of the column; `quantity`: what the vehicle calls it, such as `psi`, `rudder` or `density`.
+    - `name`: of the column; `quantity`: what the vehicle calls it, such as `psi`, `rudder` or `density`; empty for
+      a raw form of one.
     - `role`: a held input, a prescribed motion or surrounding (interpolated), or measured.
     - `unit`: SI, empty where the vehicle does not say, as a mechanism's.
     - `sigma`: 1-σ noise of a measured channel (SI), 0 where that is unknown.
@@ -40,10 +41,11 @@ def channels_of(layout: Layout) -> tuple[Channel, ...]:
         Channel(column, name, "prescribed", _ENVIRONMENT_UNITS.get(name, "") if body else "")
         for name, column in layout.environment
     ]
-    found += [
-        Channel(output.channel, output.channel, "measured", layout.unit(output.channel), output.sigma or 0.0)
-        for output in layout.outputs
-    ]
+    plain = layout.plain
+    for output in layout.outputs:
+        usual = plain.get(output.channel) == output.column or layout.is_angle(output.channel)
+        quantity, unit = output.channel if usual else "", layout.unit(output.name)
+        found.append(Channel(output.column, quantity, "measured", unit, output.sigma or 0.0))
     first: dict[str, Channel] = {}
     for channel in found:
         first.setdefault(channel.name, channel)

@@ -30,8 +30,7 @@ class Motions:
     def of(cls, layout: Layout, columns: Mapping[str, np.ndarray], speed: float) -> "Motions":
         """The motions of a run with the samples `columns`; `speed` (m/s) is that of a body whose surge is locked."""
         prescribed = dict(layout.prescribed)
-        named = {name: columns[column] for name, column in prescribed.items() if column in columns}
-        named |= {name: columns[name] for name in layout.channels if name in columns}
+        named = {name: columns[column] for name, column in layout.plain.items() if column in columns}
         there = {name: values for name, values in named.items() if np.isfinite(values).any()}
         every = {**_EQUATION_OF, **_FREE_WITH} if layout.kind == "submerged-body" else {}
         locked = [n for n, equation in every.items() if equation not in layout.equations and n not in prescribed]

@@ -17,7 +17,7 @@ from ..recording.runs import Runs
 from ..report.text import unit
 from ..results import RESULTS
 from ..simulate import simulate
-from ..vehicle import AbstractVehicle, read_vehicle, vehicle_findings
+from ..vehicle import AbstractVehicle, read_vehicle, vehicle_findings, wrapped_columns
 from . import session, terminal
 from .output import fresh_file, paths_of
 from .runs import checked_run, load_run
@@ -79,13 +79,13 @@ def simulated(
 
 
 def with_every_channel(recording: Recording, vehicle: AbstractVehicle) -> Recording:
-    """The recording with the vehicle's channels that it lacks as columns of missing samples.
+    """The recording with the columns of the vehicle's outputs that it lacks as columns of missing samples.
 
     **Raises** `InputError` for a channel that it has and that cannot be used.
     """
-    channels = vehicle.layout.channels
-    absent = [c for c in channels if c not in recording.columns and c not in recording.unusable]
-    table = {c: recording.column(c) for c in channels if c not in absent}
+    measured = vehicle.layout.columns
+    absent = [c for c in measured if c not in recording.columns and c not in recording.unusable]
+    table = {c: recording.column(c) for c in measured if c not in absent}
     nothing = np.full(len(recording.times), np.nan)
     columns = recording.columns | table | dict.fromkeys(absent, nothing)
     return dataclasses.replace(recording, columns=columns)
@@ -135,9 +135,9 @@ def errors(
     error = residual_outputs(vehicle, runs, shown)
     rms = channel_rms(error, runs, layout.channels)
     known = [one.sigma is not None for one in layout.outputs]
-    sigma = np.array([rms[one.channel] or 1.0 if one.sigma is None else one.sigma for one in layout.outputs])
+    sigma = np.array([rms[one.name] or 1.0 if one.sigma is None else one.sigma for one in layout.outputs])
     assessment = assess_residuals(layout.channels, np.asarray(error) / sigma, np.asarray(runs.mask), known=known)
-    stated = {one.channel: one.sigma for one in layout.outputs}
+    stated = {one.name: one.sigma for one in layout.outputs}
     table = {
         one.channel: {
             "samples": one.samples,
@@ -166,7 +166,7 @@ def answer(vehicle: AbstractVehicle, recording: Recording, shown: Float[np.ndarr
     """The recording's inputs with the model's outputs."""
     layout = vehicle.layout
     table = {name: recording.column(name) for name in (*layout.held, *layout.interpolated)}
-    table |= dict(zip(layout.channels, shown.T, strict=True))
+    table |= dict(zip(layout.columns, wrapped_columns(layout.outputs, shown).T, strict=True))
     return Recording(out.stem, recording.times, table, str(out))
 
 

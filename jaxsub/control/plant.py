@@ -106,7 +106,7 @@ class Plant(eqx.Module):
     def channels(self, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> dict[str, Any]:
         """Every channel that the vehicle can produce, accelerometers apart, before any sensor."""
         signals = self._nodes(self._signals(u), time)[0]
-        return self.vehicle.channels(self.vehicle.motion(x[: self.own], signals), {})
+        return self.vehicle.channels(self.vehicle.motion(x[: self.own], signals))
 
     def jacobians(self, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> Jacobians:
         """Derivatives of `step` and `output` by state and input."""
@@ -146,7 +146,7 @@ class Plant(eqx.Module):
     def _actuate(self, memory: Sequence[Array] | None, nodes: Array) -> tuple[Array, dict[int, Array]]:
         """`nodes` after the actuators, and what these then remember; without a memory it is all of the command."""
         names = [name for name, _ in self.vehicle.layout.inputs]
-        after: dict[int, Array] = {}
+        nodes, after = self.vehicle.true_inputs(nodes), {}
         for i, effect in enumerate(self.vehicle.effects):
             if isinstance(effect, AbstractActuator):
                 column = names.index(effect.actuator)

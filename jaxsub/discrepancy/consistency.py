@@ -44,14 +44,17 @@ def compared(
 def assessed(
     error: Sequence[Float[np.ndarray, "k c"]],
     recordings: Sequence[Recording],
-    channels: Sequence[str],
+    columns: Mapping[str, str],
     sigma: Float[np.ndarray, " c"],
 ) -> Assessment:
-    """The tests of size, whiteness and spikes of a model's simulation `error` on `recordings`, a run each, in SI."""
-    pairs = [stacked_columns([run.column(channel) for run in recordings]) for channel in channels]
+    """The tests of size, whiteness and spikes of a model's simulation `error` on `recordings`, a run each, in SI.
+
+    `columns` has the measured column of each output.
+    """
+    pairs = [stacked_columns([run.column(column) for run in recordings]) for column in columns.values()]
     mask = np.stack([there for _, there in pairs], axis=-1)
     whitened = np.stack([run[: mask.shape[1]] / sigma for run in error])
-    return assess_residuals(channels, np.where(mask, whitened, 0.0), mask)
+    return assess_residuals(tuple(columns), np.where(mask, whitened, 0.0), mask)
 
 
 def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder], assessment: Assessment) -> Judged:

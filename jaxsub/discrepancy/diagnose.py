@@ -136,7 +136,7 @@ class _Account:
             candidates=_became(self.first.naming.candidates, physics, standing),
             forces=field.traces,
             remaining_forces=traces(best.view, train) if best.added else field.traces,
-            overlays=[] if shown is None else overlays(test, layout.channels, shown.before, shown.after),
+            overlays=[] if shown is None else overlays(test, layout.measured, shown.before, shown.after),
             coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, start, improved),
             channels=channels,
             runs=[*run_quality(train, "train"), *run_quality(test, "held out")],

@@ -1,7 +1,7 @@
 """Models simulated along the test runs, once, after the last decision."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Array, Float
@@ -91,13 +91,13 @@ def _sums(samples: Float[np.ndarray, " k"], blocks: int) -> Float[np.ndarray, " 
 
 
 def overlays(
-    recordings: Sequence[Recording], channels: tuple[str, ...], baseline: Evaluation, improved: Evaluation
+    recordings: Sequence[Recording], columns: Mapping[str, str], baseline: Evaluation, improved: Evaluation
 ) -> list[Overlay]:
-    """Measured and simulated outputs of the test runs."""
+    """Measured and simulated outputs of the test runs; `columns` has the measured column of each output."""
     drawn = []
     for recording, before, after in zip(recordings, baseline.predicted, improved.predicted, strict=True):
         k = len(recording.times)
-        named = lambda table, k=k: {c: table[:k, i] for i, c in enumerate(channels)}
-        measured = {c: recording.column(c) for c in channels}
+        named = lambda table, k=k: {c: table[:k, i] for i, c in enumerate(columns)}
+        measured = {c: recording.column(column) for c, column in columns.items()}
         drawn.append(Overlay(recording.name, recording.times, measured, named(before), named(after)))
     return drawn

@@ -131,7 +131,7 @@ def recorded_limits(vehicle: AbstractVehicle, like: Recording) -> Limits:
     rate = {name: float(most) for name, most in zip(layout.held, fastest, strict=True) if most > 0.0}
     runs = batch(vehicle, [like])
     states = sampled_states(vehicle, runs, Problem.of(vehicle, runs, jnp.ones(len(layout.channels))).guess)[0]
-    shown = vehicle.channels(vehicle.motion(states, runs.signals[0]), {})
+    shown = vehicle.channels(vehicle.motion(states, runs.signals[0]))
     body = layout.kind == "submerged-body"
     channels: dict[str, Range] = {}
     for name in [n for n in ("phi", "theta", "z") if n in layout.positions] if body else layout.equations:
@@ -175,7 +175,7 @@ def _blank(models: Sequence[AbstractVehicle], like: Recording, times: np.ndarray
         np.searchsorted(source, np.mod(times, source[-1] + np.diff(source)[-1]) + 1e-9 * source[-1], side="right") - 1
     )
     used = like.inputs(layout.held)[turn]
-    columns = {name: np.zeros(len(times)) for name in layout.channels} | _around(layout.interpolated, like, times)
+    columns = {name: np.zeros(len(times)) for name in layout.columns} | _around(layout.interpolated, like, times)
     columns |= dict(zip(layout.held, used.T, strict=True))
     blank = Recording("next manoeuvre", times, columns, "next manoeuvre")
     return max((batch(model, [blank]) for model in models), key=lambda runs: runs.substeps), used
@@ -191,7 +191,7 @@ def _recording(vehicle: AbstractVehicle, like: Recording, times: np.ndarray, inp
     """The inputs as a recording, the first row with the first sample of each measured channel of `like`."""
     layout = vehicle.layout
     columns = {}
-    for name in layout.channels:
+    for name in layout.columns:
         seen = like.column(name)[np.isfinite(like.column(name))]
         columns[name] = np.where(np.arange(len(times)) == 0, seen[0] if len(seen) else np.nan, np.nan)
     columns |= _around(layout.interpolated, like, times)

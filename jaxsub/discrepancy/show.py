@@ -64,12 +64,10 @@ def channel_quality(fit: Fit) -> list[ChannelQuality]:
     rows = []
     for i, output in enumerate(fit.vehicle.layout.outputs):
         samples = int(mask[..., i].sum())
-        unit = fit.vehicle.layout.unit(output.channel)
+        unit = fit.vehicle.layout.unit(output.name)
         missing = 1.0 - samples / live.sum()
         sigma = float(stated[i])
-        rows.append(
-            ChannelQuality(output.channel, unit, samples, missing, sigma, output.sigma is None, float(white[i]))
-        )
+        rows.append(ChannelQuality(output.name, unit, samples, missing, sigma, output.sigma is None, float(white[i])))
     return rows
 
 

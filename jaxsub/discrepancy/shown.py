@@ -63,7 +63,7 @@ def shown_on(
     before, after = found[0], found[-1]
     labels = ["baseline", "improved"][: len(models)]
     remains = {label: remainders(one.error, test, layout, sigma) for label, one in zip(labels, found, strict=True)}
-    assessment = assessed(after.error, test, layout.channels, sigma)
+    assessment = assessed(after.error, test, layout.measured, sigma)
     explained = compared(before.rms, after.rms, remains["baseline"], quality, assessment)
     gain = test_gain(before, after, pieces) if len(models) > 1 else None
     return Shown(before, after, remains, explained, assessment, gain)

@@ -39,8 +39,8 @@ def remainders(
     inputs = {name: (values, there) for name, (values, there) in inputs.items() if np.any(values)}
     step = float(np.median(np.concatenate([np.diff(run.times) for run in recordings])))
     found = {}
-    for i, channel in enumerate(layout.channels):
-        _, measured = stacked_columns([run.column(channel) for run in recordings])
+    for i, (channel, column) in enumerate(layout.measured.items()):
+        _, measured = stacked_columns([run.column(column) for run in recordings])
         own = np.stack([run[: measured.shape[1], i] / sigma[i] for run in error])
         found[channel] = _remainder(np.where(measured, own, 0.0), measured, inputs, step)
     return found
@@ -48,7 +48,7 @@ def remainders(
 
 def beyond_noise(left: dict[str, Remainder], rms: dict[str, float], layout: Layout) -> list[str]:
     """One line: the channels of stated noise whose simulation error is larger than it and correlated."""
-    stated = [output.channel for output in layout.outputs if output.sigma is not None]
+    stated = [output.name for output in layout.outputs if output.sigma is not None]
     found = [c for c in stated if left[c].low > 1.0 and left[c].random < RESIDUAL_LEVEL]
     led = lambda one: f", with {one.follows}" if one.independent < RESIDUAL_LEVEL else ""
     said = ", ".join(f"{c} ({rms[c]:.2g} σ{led(left[c])})" for c in found)

@@ -25,7 +25,7 @@ from ..likelihood import (
 )
 from ..recording.runs import Runs
 from ..simulate import Trajectory
-from ..vehicle import AbstractVehicle
+from ..vehicle import AbstractVehicle, quantities_of
 from .innovation_search import InnovationSearch, Iterate, distinct, with_wide_priors
 from .settings import BLOCKS, LARGE_ERROR
 from .tones import tones
@@ -233,6 +233,7 @@ def facts(view: View) -> Facts:
         depth_range=(float(depth.min()), float(depth.max())),
         tones=dict(zip(layout.equations, shaking, strict=False)),
         frequencies=frequencies,
+        quantities=quantities_of(layout.outputs, body),
         has=view.vehicle.has,
         fixed_gains=view.vehicle.fixed_gains,
     )

@@ -35,6 +35,11 @@ def edge() -> Any:
     return eqx.field(static=True, metadata={"signed": True})
 
 
+def of_output() -> Any:
+    """A static text that a vehicle fills in: what the effect's channels show, as `Facts.quantities` has it."""
+    return eqx.field(static=True, default="", metadata={"of_output": True})
+
+
 def _field(role: str, unit: str, sign: int, default: float, most: float = math.inf) -> Any:
     return eqx.field(
         default_factory=lambda: number(default),
@@ -78,6 +83,11 @@ class AbstractEffect(eqx.Module):
         return {field.name: field.name for field in number_fields(self)}
 
     @property
+    def term(self) -> str:
+        """The name of what a vehicle may contain that makes this effect superfluous (`Facts.has`)."""
+        return ""
+
+    @property
     def label(self) -> str:
         """A name that distinguishes two forms of one effect, such as `quadratic-damping[roll]`."""
         chosen = ",".join(value for value in options(self).values() if isinstance(value, str))
@@ -102,11 +112,6 @@ class AbstractForce(AbstractEffect):
     @abc.abstractmethod
     def force(self, motion: Motion) -> dict[str, Signal]:
         """Generalised force (N or N m) by equation; leading axes follow those of `motion`."""
-
-    @property
-    def term(self) -> str:
-        """The name of what a vehicle's own equations may contain that makes this effect superfluous (`Facts.has`)."""
-        return ""
 
 
 class AbstractFlow(AbstractEffect):
@@ -291,9 +296,12 @@ def numbers(effect: AbstractEffect) -> dict[str, float]:
 
 def options(effect: AbstractEffect) -> dict[str, Any]:
     """The static choices of an effect: its equation, actuator or channel, and fixed sizes."""
-    return {
-        field.name: getattr(effect, field.name) for field in dataclasses.fields(effect) if "role" not in field.metadata
-    }
+    return {field.name: getattr(effect, field.name) for field in option_fields(type(effect))}
+
+
+def option_fields(kind: type[AbstractEffect]) -> list[dataclasses.Field]:
+    """The fields of an effect that are static choices."""
+    return [field for field in dataclasses.fields(kind) if not {"role", "of_output"} & set(field.metadata)]
 
 
 def parameter_table(effect: AbstractEffect) -> dict[str, Parameter]:

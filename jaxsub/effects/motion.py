@@ -1,6 +1,8 @@
 """What a force, an actuator or a sensor may look at: the motion at one time, or along a whole run."""
 
 import abc
+import re
+from collections.abc import Mapping
 
 import equinox as eqx
 import numpy as np
@@ -34,6 +36,20 @@ def unit_per(equation: str, *variables: str) -> str:
     known |= dict.fromkeys((*angles, "shaft_speed"), "(rad/s)")
     units = [known.get(variable, "rad") for variable in variables]
     return "/".join([force, *units]) if equation in EQUATIONS else "1"
+
+
+def quantity_of(channels: str, quantities: Mapping[str, str]) -> str:
+    """What outputs, listed with commas between, show by `quantities`; nothing where their own names say it."""
+    named = [quantities.get(channel, "") for channel in channels.split(",")]
+    return ",".join(named) if any(named) else ""
+
+
+def read_quantity(quantity: str, channel: str) -> tuple[str, float, str]:
+    """The channel of the motion, sign and SI unit that `quantity` says, or else the name of the `channel`."""
+    match = re.fullmatch(r"(-?)(\w+)\[(.*)\]", quantity)
+    if match is None:
+        return channel, 1.0, CHANNEL_UNITS.get(channel, "1")
+    return match[2], -1.0 if match[1] else 1.0, match[3] or "1"
 
 
 class AbstractActuation(eqx.Module):
@@ -108,7 +124,9 @@ class Facts(eqx.Module):
     - `input_range`: rms, largest size and largest rate (per s) of each actuator's command.
     - `output_range`: least and largest of what was recorded of each channel.
     - `depth_range`: least and largest depth, m.
-    - `has`: what the vehicle's own equations contain of what an effect could say: names of `Derivative`s, `coriolis`.
+    - `quantities`: of each output whose name does not say it, what it shows: `-v[m/s]` of a velocity to port.
+    - `has`: what the vehicle contains of what an effect could say: names of `Derivative`s, `coriolis`, free scales and
+      offsets of sensors such as `psi.offset`.
       An actuator by a name of its own has those of its force; a control surface has one such as `N_uu_port_fin`.
     - `fixed_gains`: the vehicle's actuators whose force no free number of its own scales as a whole.
     - `tones`: frequencies (rad/s) at which what each equation misses stands out, inside `wave_band`; `frequencies`: how
@@ -133,8 +151,14 @@ class Facts(eqx.Module):
     depth_range: tuple[float, float] = (0.0, 0.0)
     tones: dict[str, tuple[float, ...]] = eqx.field(default_factory=dict)
     frequencies: int = 0
+    quantities: dict[str, str] = eqx.field(default_factory=dict)
     has: frozenset[str] = frozenset()
     fixed_gains: tuple[str, ...] = ()
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """What each channel shows, such as `v` of `dvl_v`."""
+        return {channel: read_quantity(self.quantities.get(channel, ""), channel)[0] for channel in self.channels}
 
     @property
     def largest_commands(self) -> dict[str, float]:

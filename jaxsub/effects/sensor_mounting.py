@@ -9,8 +9,8 @@ from jaxtyping import Array, Float
 
 from ..arrays import namespace
 from ..errors import InputError
-from .base import AbstractInstrument, amplitude
-from .motion import EQUATIONS, VELOCITIES, Facts, Motion, Signal
+from .base import AbstractInstrument, amplitude, of_output
+from .motion import EQUATIONS, VELOCITIES, Facts, Motion, Signal, quantity_of, read_quantity
 
 _TRIADS = (("u", "v", "w"), ("p", "q", "r"), ("ax", "ay", "az"))
 _ARMED = (_TRIADS[0], ("x", "y", "z"), _TRIADS[2])
@@ -28,11 +28,18 @@ class _Mounting(AbstractInstrument):
     """Of an instrument whose channels, one or more of a triad, are listed with commas between."""
 
     channel: eqx.AbstractVar[str]
+    quantity: eqx.AbstractVar[str]
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Those listed."""
         return tuple(self.channel.split(","))
+
+    @property
+    def shown(self) -> dict[str, tuple[str, float]]:
+        """What each channel shows of the motion, and with which sign."""
+        quantities = self.quantity.split(",") if self.quantity else [""] * len(self.channels)
+        return {c: read_quantity(q, c)[:2] for c, q in zip(self.channels, quantities, strict=True)}
 
 
 class SensorMisalignment(_Mounting):
@@ -49,11 +56,14 @@ class SensorMisalignment(_Mounting):
     channel: str = eqx.field(static=True)
     sees: str = eqx.field(static=True)
     epsilon: Array = amplitude("rad")
+    quantity: str = of_output()
 
     def __check_init__(self):
         seen = self.sees.split(",")
         known = {(a, b) for triad in _TRIADS for a in triad for b in triad if a != b}
-        paired = len(seen) == len(self.channels) and set(zip(self.channels, seen, strict=True)) <= known
+        motions = {c: motion for c, (motion, _) in self.shown.items()}
+        turned = {(motions[c], motions.get(s, s)) for c, s in zip(self.channels, seen, strict=False)}
+        paired = len(seen) == len(self.channels) and turned <= known
         if not paired or (len(seen) > 1 and seen[::-1] != list(self.channels)):
             remedy = "name for a channel another axis of its triad, for two each other: channel = 'q,r', sees = 'r,q'"
             raise InputError(self.label, f"{self.channel} cannot see {self.sees}", remedy)
@@ -66,10 +76,13 @@ class SensorMisalignment(_Mounting):
         """
         free = [VELOCITIES[e] for e in facts.equations] if facts.kind == "submerged-body" else []
         known = [*free, *(c for c in facts.channels if c in _TRIADS[2])] if free else []
-        triads = [(c, triad) for c in facts.channels for triad in _TRIADS if c in triad]
-        alone = [cls(c, other) for c, triad in triads for other in triad if other != c and other in known]
-        turned = [pair for a, b, c in _TRIADS for pair in ((b, c), (c, a), (a, b)) if {*pair} <= {*known}]
-        return [*alone, *(cls(f"{b},{c}", f"{c},{b}") for b, c in turned if {b, c} <= {*facts.channels})]
+        make = lambda channel, sees: cls(channel, sees, quantity=quantity_of(channel, facts.quantities))
+        triads = [(c, shown, triad) for c, shown in facts.shown.items() for triad in _TRIADS if shown in triad]
+        alone = [make(c, other) for c, shown, triad in triads for other in triad if other != shown and other in known]
+        moved = {*free, *({*facts.shown.values()} & {*_TRIADS[2]} if free else ())}
+        pairs = [pair for a, b, c in _TRIADS for pair in ((b, c), (c, a), (a, b)) if {*pair} <= moved]
+        turned = [own for pair in pairs for own in instruments(facts, pair) if len(own) == 2]
+        return [*alone, *(make(",".join(own), ",".join(own[::-1])) for own in turned)]
 
     @property
     def expression(self) -> str:
@@ -107,12 +120,13 @@ class SensorLeverArm(_Mounting):
     channel: str = eqx.field(static=True)
     axis: str = eqx.field(static=True)
     arm: Array = amplitude("m")
+    quantity: str = of_output()
 
     def __check_init__(self):
         what = f"no arm along {self.axis} shows in {self.channel}"
         if self.axis not in ("x", "y", "z"):
             raise InputError(self.label, what, "give the axis x, y or z")
-        if not set(self.channels) <= set(_TURNS):
+        if not {motion for motion, _ in self.shown.values()} <= set(_TURNS):
             raise InputError(self.label, what, f"one shows in {', '.join(_TURNS)}")
 
     @classmethod
@@ -122,15 +136,18 @@ class SensorLeverArm(_Mounting):
         And those of a triad that an arm of one instrument shows in.
         """
         free = [VELOCITIES[e] for e in facts.equations] if facts.kind == "submerged-body" else []
-        shows = lambda channel, axis: _TURNS.get(channel, {}).get(axis) in free
-        alone = [cls(c, axis) for c in facts.channels for axis in "xyz" if shows(c, axis)]
-        felt = [([c for c in triad if c in facts.channels and shows(c, x)], x) for triad in _ARMED for x in "xyz"]
-        return [*alone, *(cls(",".join(own), axis) for own, axis in felt if len(own) > 1)]
+        shows = lambda motion, axis: _TURNS.get(motion, {}).get(axis) in free
+        make = lambda channel, axis: cls(channel, axis, quantity=quantity_of(channel, facts.quantities))
+        alone = [make(c, axis) for c, motion in facts.shown.items() for axis in "xyz" if shows(motion, axis)]
+        felt = [([c for c in triad if shows(c, x)], x) for triad in _ARMED for x in "xyz"]
+        several = [(own, axis) for triad, axis in felt for own in instruments(facts, triad) if len(own) > 1]
+        return [*alone, *(make(",".join(own), axis) for own, axis in several)]
 
     @property
     def expression(self) -> str:
         """The motion of the sensor about the origin."""
-        return ", ".join(f"{channel} measured = {channel} + {self._said(channel)}" for channel in self.channels)
+        said = {c: f"{'-+'[sign > 0]} {self._said(motion)}" for c, (motion, sign) in self.shown.items()}
+        return ", ".join(f"{channel} measured = {channel} {arm}" for channel, arm in said.items())
 
     def _said(self, channel: str) -> str:
         if channel in _TRIADS[0]:
@@ -144,7 +161,8 @@ class SensorLeverArm(_Mounting):
     ) -> dict[str, Float[Signal, " *k"]]:
         """The outputs where the sensor is."""
         asarray = namespace(times, self.arm).asarray
-        return {c: asarray(outputs[c] + self.arm * self._per_metre(c, motion)) for c in self.channels}
+        moved = {c: sign * self.arm * self._per_metre(name, motion) for c, (name, sign) in self.shown.items()}
+        return {c: asarray(outputs[c] + part) for c, part in moved.items()}
 
     def _per_metre(self, channel: str, motion: Motion) -> Signal:
         xp = namespace(*(motion.rates[e] for e in EQUATIONS[3:]))
@@ -171,3 +189,16 @@ class SensorLeverArm(_Mounting):
         if channel == "y":
             return level * xp.sin(psi) + across * xp.cos(psi)
         return {"x": -xp.sin(theta), "y": xp.cos(theta) * xp.sin(phi), "z": xp.cos(theta) * xp.cos(phi)}[self.axis]
+
+
+def instruments(facts: Facts, motions: Sequence[str]) -> list[list[str]]:
+    """The channels that show some of `motions`, those of one instrument together: `dvl_u` and `dvl_v`, or `u` and `v`.
+
+    Of one instrument are those whose names differ by their motions alone.
+    """
+    found: dict[str, list[str]] = {}
+    for motion in motions:
+        for channel, shown in facts.shown.items():
+            if shown == motion:
+                found.setdefault(channel.removesuffix(motion), []).append(channel)
+    return list(found.values())

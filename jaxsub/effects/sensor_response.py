@@ -14,7 +14,7 @@ from .base import AbstractSensor, amplitude, shape
 from .motion import Facts, Motion, Signal
 
 # channels that have one sign by nature
-_ONE_SIGN = ("speed", "depth", "z", "x", "y", "u")
+_ONE_SIGN = ("speed", "depth", "z", "x", "y", "u", "pressure", "latitude", "longitude")
 
 
 class SensorDelay(AbstractSensor):
@@ -103,7 +103,7 @@ class SensorRectification(AbstractSensor):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorRectification]":
         """Each channel that may be negative: where only a part is lost, some of it still is."""
-        return [cls(c) for c in facts.channels if c not in _ONE_SIGN]
+        return [cls(c) for c, shown in facts.shown.items() if shown not in _ONE_SIGN]
 
     @property
     def expression(self) -> str:

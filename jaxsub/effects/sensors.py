@@ -7,8 +7,8 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from ..arrays import namespace
-from .base import AbstractSensor, amplitude
-from .motion import CHANNEL_UNITS, Facts, Motion, Signal
+from .base import AbstractSensor, amplitude, of_output
+from .motion import Facts, Motion, Signal, quantity_of, read_quantity
 
 
 class SensorBias(AbstractSensor):
@@ -18,15 +18,21 @@ class SensorBias(AbstractSensor):
     family: ClassVar[str] = "sensors"
     channel: str = eqx.field(static=True)
     bias: Array = amplitude("1")
+    quantity: str = of_output()
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorBias]":
         """One for each channel."""
-        return [cls(channel) for channel in facts.channels]
+        return [cls(channel, quantity=quantity_of(channel, facts.quantities)) for channel in facts.channels]
 
     def units(self) -> dict[str, str]:
         """The channel's own."""
-        return {"bias": CHANNEL_UNITS.get(self.channel, "1")}
+        return {"bias": read_quantity(self.quantity, self.channel)[2]}
+
+    @property
+    def term(self) -> str:
+        """The offset of the output."""
+        return f"{self.channel}.offset"
 
     @property
     def expression(self) -> str:
@@ -55,6 +61,11 @@ class SensorScale(AbstractSensor):
         return [cls(channel) for channel in facts.channels]
 
     @property
+    def term(self) -> str:
+        """The scale of the output."""
+        return f"{self.channel}.scale"
+
+    @property
     def expression(self) -> str:
         """The scale."""
         return f"{self.channel} measured = (1 + s) {self.channel}"
@@ -73,15 +84,16 @@ class SensorDrift(AbstractSensor):
     family: ClassVar[str] = "sensors"
     channel: str = eqx.field(static=True)
     drift: Array = amplitude("1/s")
+    quantity: str = of_output()
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorDrift]":
         """One for each channel."""
-        return [cls(channel) for channel in facts.channels]
+        return [cls(channel, quantity=quantity_of(channel, facts.quantities)) for channel in facts.channels]
 
     def units(self) -> dict[str, str]:
         """The channel's own, per second."""
-        return {"drift": f"{CHANNEL_UNITS.get(self.channel, '1')}/s"}
+        return {"drift": f"{read_quantity(self.quantity, self.channel)[2]}/s"}
 
     @property
     def expression(self) -> str:

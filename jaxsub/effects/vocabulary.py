@@ -142,10 +142,10 @@ def is_effect(kind: object) -> bool:
 def candidates(facts: Facts, kinds: tuple[type[AbstractEffect], ...] | None = None) -> list[AbstractEffect]:
     """Every form that makes sense on a vehicle of every effect of `kinds`, by default of `vocabulary`.
 
-    What the vehicle's own equations contain already (`Facts.has`) is no candidate.
+    What the vehicle contains already (`Facts.has`) is no candidate.
     """
     every = [effect for kind in (vocabulary() if kinds is None else kinds) for effect in kind.candidates(facts)]
-    return [effect for effect in every if not (isinstance(effect, AbstractForce) and effect.term in facts.has)]
+    return [effect for effect in every if effect.term not in facts.has]
 
 
 def named(term: Derivative, facts: Facts, kinds: tuple[type[AbstractEffect], ...]) -> AbstractDerivative | None:

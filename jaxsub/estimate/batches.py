@@ -22,6 +22,6 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     longest = max(float(np.diff(r.times).max()) for r in recordings)
     # linear damping is exact at any step; effects that replace it have the same rate and are not
     substeps = substeps_of(longest * fastest)
-    columns = {"held": layout.held, "interpolated": layout.interpolated, "channels": layout.channels}
+    columns = {"held": layout.held, "interpolated": layout.interpolated, "channels": layout.columns}
     runs = stack_runs(recordings, **columns, angles=layout.angles, substeps=substeps)
     return dataclasses.replace(runs, substeps=substeps_free(vehicle, runs))

@@ -14,8 +14,6 @@ from ..vehicle.base import memory_states
 _SPREAD = {"m/s": 1.0, "rad/s": 0.5, "rad": 0.5, "m": 10.0}
 # of what an effect remembers, which starts at zero
 _MEMORY = 0.1
-# channels other than its own name that measure a state
-_ALIASES = {"z": ("z", "depth")}
 
 
 def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r s"], Float[Array, " s"]]:
@@ -26,7 +24,7 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
     """
     layout, measured = vehicle.layout, state_channels(vehicle.layout)
     kept = memory_states(vehicle.effects)
-    mask, outputs, times = np.asarray(runs.mask), np.asarray(runs.outputs), np.asarray(runs.times)
+    mask, outputs, times = np.asarray(runs.mask), _as_states(vehicle, runs), np.asarray(runs.times)
     guess = np.tile(_resting(vehicle), (len(times), 1))
     spread = np.ones(len(layout.states))
     for i, name in enumerate(layout.states):
@@ -58,9 +56,16 @@ def _resting(vehicle: AbstractVehicle) -> Float[np.ndarray, " s"]:
 
 
 def state_channels(layout: Layout) -> dict[str, str]:
-    """By state the channel that measures it, of those states that have one."""
-    among = {name: [c for c in _ALIASES.get(name, (name,)) if c in layout.channels] for name in layout.states}
-    return {name: channels[0] for name, channels in among.items() if channels}
+    """By state the output that measures it, of those states that have one; the state itself before other forms."""
+    among = {name: [o for o in layout.outputs if o.state == name] for name in layout.states}
+    plain = lambda output: output.channel != output.name
+    return {name: min(outputs, key=plain).name for name, outputs in among.items() if outputs}
+
+
+def _as_states(vehicle: AbstractVehicle, runs: Runs) -> Float[np.ndarray, "r k c"]:
+    """The outputs in the form of the states that they measure, by the sensors' present numbers."""
+    sensors, columns = jax.tree.map(np.asarray, vehicle.sensors), np.asarray(runs.outputs)
+    return np.stack([sensors.channel_of(o, columns[..., i]) for i, o in enumerate(vehicle.layout.outputs)], axis=-1)
 
 
 def _fastest(runs: Runs, column: int) -> float:

@@ -81,7 +81,7 @@ def information(vehicle: AbstractVehicle, recording: Recording) -> Information:
     runs = template(vehicle, [recording])
     model = linearise(vehicle, runs, at_rest(vehicle, 1))
     S = np.asarray(sensitivities(vehicle, model))
-    shown = vehicle.channels(vehicle.motion(model.states[0], runs.signals[0]), {})
+    shown = vehicle.channels(vehicle.motion(model.states[0], runs.signals[0]))
     inputs = np.asarray(runs.signals[0, :-1, : len(vehicle.layout.held)])
     return Information(
         tuple(row.name for row in vehicle.layout.free),
@@ -122,7 +122,7 @@ def require_designable(vehicle: AbstractVehicle) -> None:
         raise InputError(where, "has no free coefficient", "free those that the manoeuvre is to identify")
     for output in layout.outputs:
         if output.sigma is None:
-            what = f"the noise of {output.channel!r} is to be estimated"
+            what = f"the noise of {output.name!r} is to be estimated"
             raise InputError(where, what, "give its sigma: manoeuvres are weighed by it")
 
 

@@ -135,7 +135,7 @@ class Bounds(eqx.Module):
     def used(self, vehicle: AbstractVehicle, states: Float[Array, "k s"], signals: Float[Array, "k m2"]) -> Array:
         """The limited channels along a trajectory, (K, c), in their limits: inside where within -1 and 1."""
         motion = vehicle.motion(states, signals)
-        shown = vehicle.channels(motion, {})
+        shown = vehicle.channels(motion)
         columns = [jnp.broadcast_to(shown[name], states.shape[:1]) for name in self.channels]
         if not columns:
             return jnp.zeros((len(states), 0))
@@ -158,7 +158,7 @@ def producible(vehicle: AbstractVehicle) -> tuple[str, ...]:
     layout = vehicle.layout
     size = len(layout.equations) + len(layout.positions)
     motion = vehicle.motion(jnp.zeros(size), jnp.zeros(len(layout.held + layout.interpolated)))
-    return tuple(vehicle.channels(motion, {}))
+    return tuple(vehicle.channels(motion))
 
 
 def manoeuvre(
@@ -170,7 +170,7 @@ def manoeuvre(
 ) -> Recording:
     """A recording of `inputs` (K, m) at `times` (K,), s, that a simulation can be driven by; its outputs are blank."""
     layout = vehicle.layout
-    columns = {channel: np.full(len(times), np.nan) for channel in layout.channels}
+    columns = {column: np.full(len(times), np.nan) for column in layout.columns}
     columns |= {column: np.asarray(surroundings[column]) for column in layout.interpolated if column in surroundings}
     columns |= dict(zip(layout.held, np.asarray(inputs, float).T, strict=True))
     return Recording(name, times, columns, name)
@@ -179,11 +179,11 @@ def manoeuvre(
 def template(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     """Runs driven by `recordings` in which every channel is to be measured at every sample."""
     layout = vehicle.layout
-    shown = [name for name in layout.channels if name not in layout.interpolated]
+    shown = [name for name in layout.columns if name not in layout.interpolated]
     measured = [
         dataclasses.replace(r, columns=r.columns | dict.fromkeys(shown, np.zeros(len(r.times)))) for r in recordings
     ]
-    return stack_runs(measured, held=layout.held, interpolated=layout.interpolated, channels=layout.channels)
+    return stack_runs(measured, held=layout.held, interpolated=layout.interpolated, channels=layout.columns)
 
 
 def _sides(limit: Range) -> tuple[float, float]:

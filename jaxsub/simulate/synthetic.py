@@ -10,7 +10,7 @@ from ..effects import VELOCITIES
 from ..errors import InputError
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
-from ..vehicle import AbstractVehicle
+from ..vehicle import AbstractVehicle, wrapped_columns
 from .continuous import integrate
 from .sampled import measure
 
@@ -35,8 +35,8 @@ def synthetic(
 ) -> list[Recording]:
     """What `vehicle` would have recorded at the times of `recordings`, driven by their inputs.
 
-    Each holds the input columns of its recording and a column for each measured channel, SI, with white Gaussian
-    noise of the channel's sigma (none where that is to be estimated, or without `noise`). A channel recorded in an
+    Each holds the input columns of its recording and a column for each output, SI, with white Gaussian noise of its
+    sigma (none where that is to be estimated, or without `noise`). A channel recorded in an
     input column, such as a prescribed pitch, stays as it is. `start` is the initial state of each run, `at_rest` by
     default; `states` is `integrate` or `sampled_states`. The noise of run i depends on `seed` and i alone.
 
@@ -44,12 +44,12 @@ def synthetic(
     """
     layout = vehicle.layout
     columns = layout.held + layout.interpolated
-    driven = [_without_outputs(recording, columns, layout.channels) for recording in recordings]
+    driven = [_without_outputs(recording, columns, layout.columns) for recording in recordings]
     runs = stack_runs(
         driven,
         held=layout.held,
         interpolated=layout.interpolated,
-        channels=layout.channels,
+        channels=layout.columns,
         angles=layout.angles,
     )
     start = at_rest(vehicle, len(driven)) if start is None else start
@@ -60,7 +60,7 @@ def synthetic(
         outputs = shown[index, : len(recording.times)]
         _require_finite(recording, outputs)
         draws = np.random.default_rng([seed, index]).standard_normal(outputs.shape)
-        measured = dict(zip(layout.channels, (outputs + sigma * draws).T, strict=True))
+        measured = dict(zip(layout.columns, wrapped_columns(layout.outputs, outputs + sigma * draws).T, strict=True))
         inputs = {name: recording.column(name) for name in columns}
         made.append(Recording(recording.name, recording.times, measured | inputs, f"{recording.source} (synthetic)"))
     return made

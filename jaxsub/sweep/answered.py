@@ -27,8 +27,8 @@ def answered(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> list[
     shown, made = np.asarray(simulate(found.vehicle, runs, found.start)), []
     for recording, answer in zip(recordings, shown, strict=True):
         columns = dict(recording.columns)
-        for channel, values in zip(vehicle.layout.channels, answer.T, strict=True):
-            missing = np.isnan(recording.column(channel))
-            columns[channel] = np.where(missing, np.nan, values[: len(missing)])
+        for column, values in zip(vehicle.layout.columns, answer.T, strict=True):
+            missing = np.isnan(recording.column(column))
+            columns[column] = np.where(missing, np.nan, values[: len(missing)])
         made.append(Recording(recording.name, recording.times, columns, f"{recording.source} (answered)"))
     return made

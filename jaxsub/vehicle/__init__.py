@@ -1,7 +1,7 @@
 """Vehicles: one model that simulation, likelihood, filters, diagnosis and controllers share."""
 
 from .absorb import added_effects, with_coefficients
-from .base import AbstractVehicle, Layout, Output
+from .base import AbstractVehicle, Layout
 from .build import build
 from .checks import require_inertia
 from .dimensions import check_units
@@ -10,6 +10,7 @@ from .initial import InitialFile, initial_file, published_file
 from .mechanism import Mechanism
 from .oddities import vehicle_findings
 from .read import read_vehicle, vehicle_from
+from .sensors import Output, Sensors, quantities_of, wrapped_columns
 from .submerged_body import SubmergedBody
 from .write import vehicle_text, write_vehicle
 
@@ -19,12 +20,14 @@ __all__ = [
     "Layout",
     "Mechanism",
     "Output",
+    "Sensors",
     "SubmergedBody",
     "added_effects",
     "build",
     "check_units",
     "initial_file",
     "published_file",
+    "quantities_of",
     "read_sdf",
     "read_vehicle",
     "require_inertia",
@@ -33,5 +36,6 @@ __all__ = [
     "vehicle_from",
     "vehicle_text",
     "with_coefficients",
+    "wrapped_columns",
     "write_vehicle",
 ]

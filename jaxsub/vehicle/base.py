@@ -11,7 +11,6 @@ from jaxtyping import Array, Float
 
 from ..arrays import Values
 from ..effects import (
-    CHANNEL_UNITS,
     INPUT_UNITS,
     VELOCITIES,
     AbstractActuator,
@@ -25,18 +24,9 @@ from ..effects import (
     with_numbers,
 )
 from ..parameters import Parameter
+from .sensors.output import ANGLES, SPECIFIC_FORCE, Output, channel_unit
+from .sensors.sensors import Sensors
 from .ties import Tie
-
-_ANGLES = ("phi", "theta", "psi")
-
-
-@dataclasses.dataclass(frozen=True)
-class Output:
-    """A measured channel: its 1-σ sensor noise in SI (None: to be estimated) and an accelerometer's lever arm in m."""
-
-    channel: str
-    sigma: float | None = None
-    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,18 +75,37 @@ class Layout:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The measured channels."""
-        return tuple(output.channel for output in self.outputs)
+        """The names of the outputs, by default their channels."""
+        return tuple(output.name for output in self.outputs)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The measured column of each output."""
+        return tuple(output.column for output in self.outputs)
+
+    @property
+    def measured(self) -> dict[str, str]:
+        """The measured columns by output."""
+        return {output.name: output.column for output in self.outputs}
+
+    @property
+    def plain(self) -> dict[str, str]:
+        """By channel the measured or prescribed column that has it as it is at the origin, but for an offset."""
+        known = {row.name.rpartition(".")[0] for row in self.parameters if not row.name.endswith(".offset")}
+        moved = lambda o: any(o.lever_arm) and o.channel not in SPECIFIC_FORCE
+        own = [o for o in self.outputs if not (o.unit or o.frame or moved(o) or {o.name, o.table} & known)]
+        prescribed = {name: column for name, column in self.prescribed if name not in known}
+        return prescribed | {output.channel: output.column for output in reversed(own)}
 
     @property
     def angles(self) -> tuple[str, ...]:
-        """The measured channels and columns of prescribed motions that a whole turn leaves as they are."""
+        """The columns, measured or of prescribed motions, that a whole turn leaves as they are."""
         prescribed = (column for name, column in self.prescribed if self.is_angle(name))
-        return (*(channel for channel in self.channels if self.is_angle(channel)), *prescribed)
+        return (*(output.column for output in self.outputs if self.is_angle(output.channel)), *prescribed)
 
     def is_angle(self, channel: str) -> bool:
         """Whether a whole turn leaves a channel as it is, as it does a body's Euler angles."""
-        return self.kind == "submerged-body" and channel in _ANGLES
+        return self.kind == "submerged-body" and channel in ANGLES
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -110,8 +119,12 @@ class Layout:
         return [parameter for parameter in self.parameters if parameter.free]
 
     def unit(self, name: str) -> str:
-        """The SI unit of a body's channel or state; nothing for a mechanism's, whose `q` may be in metres or volts."""
-        return CHANNEL_UNITS.get(name, "") if self.kind == "submerged-body" else ""
+        """The SI unit of an output, or of a body's channel or state.
+
+        Nothing for a mechanism's that states none: its `q` may be in metres or volts.
+        """
+        output = next((one for one in self.outputs if one.name == name), Output(name))
+        return output.unit or (channel_unit(output.channel) if self.kind == "submerged-body" else "")
 
     def input_unit(self, name: str) -> str:
         """The SI unit of an input; nothing where the vehicle file does not say."""
@@ -129,6 +142,7 @@ class AbstractVehicle(eqx.Module):
 
     layout: eqx.AbstractVar[Layout]
     effects: eqx.AbstractVar[tuple[AbstractEffect, ...]]
+    sensors: eqx.AbstractVar[Sensors]
 
     @abc.abstractmethod
     def mass_matrix(self) -> Float[Values, "n n"]:
@@ -156,8 +170,8 @@ class AbstractVehicle(eqx.Module):
 
     @property
     def has(self) -> frozenset[str]:
-        """What its own equations contain of what an effect could say (`Facts.has`)."""
-        return frozenset()
+        """What it contains of what an effect could say (`Facts.has`): free scales and offsets of its sensors."""
+        return frozenset(row.name for row in self.layout.free if row.name in self.sensors.numbers)
 
     @property
     @abc.abstractmethod
@@ -179,8 +193,8 @@ class AbstractVehicle(eqx.Module):
         """Rates of the position states, without its effects'."""
 
     @abc.abstractmethod
-    def channels(self, motion: Motion, acceleration: Mapping[str, Signal]) -> dict[str, Signal]:
-        """Every channel the vehicle can produce, before any sensor."""
+    def channels(self, motion: Motion) -> dict[str, Signal]:
+        """Every channel that the motion shows at the origin of the vehicle's axes, before any sensor."""
 
     def values(self) -> dict[str, Array]:
         """Every number by name, effects included."""
@@ -248,11 +262,19 @@ class AbstractVehicle(eqx.Module):
     def actuate(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3 m"]) -> Float[Array, "k1 3 m"]:
         """The signals at the start, middle and end of each interval, after the actuators."""
         names = [name for name, _ in self.layout.inputs]
+        nodes = self.true_inputs(nodes)
         for effect in self.effects:
             if isinstance(effect, AbstractActuator):
                 column = names.index(effect.actuator)
                 nodes = nodes.at[:, :, column].set(effect.respond(times, nodes[:, :, column]))
         return nodes
+
+    def true_inputs(self, signals: Float[Array, "*k m"]) -> Float[Array, "*k m"]:
+        """Recorded `signals`, the inputs among them as they were where their columns are scaled or offset."""
+        for column, (name, _) in enumerate(self.layout.inputs):
+            if self.sensors.corrects(name):
+                signals = signals.at[..., column].set(self.sensors.true(name, signals[..., column]))
+        return signals
 
     def acceleration(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Float[Array, "*k n"]:
         r"""$\dot\nu$ of the free equations (m/s², rad/s²)."""
@@ -273,17 +295,17 @@ class AbstractVehicle(eqx.Module):
     def truth(
         self, times: Float[Array, " *k"], state: Float[Array, "*k s"], signals: Float[Array, "*k m"]
     ) -> tuple[dict[str, Signal], Motion]:
-        """The measured channels before any effect on a sensor, and the motion that the sensors see."""
+        """What the sensors show before any effect on them, by output, and the motion that they see."""
         columns = len(self.layout.held) + len(self.layout.interpolated)
-        timed = jnp.concatenate([signals[..., :columns], times[..., None]], axis=-1)
+        timed = jnp.concatenate([self.true_inputs(signals)[..., :columns], times[..., None]], axis=-1)
         motion = self.motion(state, timed)
-        if {"ax", "ay", "az"} & set(self.layout.channels):
+        if any(output.channel in SPECIFIC_FORCE for output in self.layout.outputs):
             rates = self.acceleration(state, timed)
             named: dict[str, Signal] = {e: rates[..., i] for i, e in enumerate(self.layout.equations)}
             motion = dataclasses.replace(motion, accelerations=named)
-        true = self.channels(motion, motion.accelerations)
-        shown = {name: jnp.broadcast_to(jnp.asarray(true[name]), times.shape) for name in self.layout.channels}
-        return dict(shown), motion
+        true = self.channels(motion)
+        shown = {output.name: self.sensors.show(output, true, motion) for output in self.layout.outputs}
+        return {name: jnp.broadcast_to(jnp.asarray(one), times.shape) for name, one in shown.items()}, motion
 
     def deviation(self, measured: Float[Array, "*k c"], modelled: Float[Array, "*k c"]) -> Float[Array, "*k c"]:
         """`measured` minus `modelled` channels; angles of a body wrapped to (-π, π]."""
@@ -292,7 +314,7 @@ class AbstractVehicle(eqx.Module):
     @property
     def turning(self) -> tuple[bool, ...]:
         """Which channels are angles of a body."""
-        return tuple(channel in self.layout.angles for channel in self.layout.channels)
+        return tuple(self.layout.is_angle(output.channel) for output in self.layout.outputs)
 
 
 def wrapped(turning: tuple[bool, ...], difference: Float[Array, "*k c"]) -> Float[Array, "*k c"]:

@@ -9,14 +9,13 @@ from ..effects import EQUATIONS, GRAVITY, AbstractEffect, derivative, parameter_
 from ..errors import InputError
 from ..parameters import Parameter, number
 from .actuators import Actuators, stage_numbers
-from .base import Layout, Output, memory_states
+from .base import Layout, memory_states
 from .checks import (
     check_coefficients,
     check_coordinates,
     check_effects,
     check_inputs,
     check_names,
-    check_outputs,
     require_inertia,
 )
 from .damping import Damping
@@ -25,6 +24,7 @@ from .mechanism import Mechanism
 from .products import Products
 from .restoring import STANDARD_DENSITY, Restoring
 from .schema import unknown_key
+from .sensors import Output, Sensors
 from .submerged_body import SubmergedBody
 from .ties import Tie, tied_values
 
@@ -59,6 +59,7 @@ def build(
     ties: tuple[Tie, ...] = (),
     input_units: dict[str, str] | None = None,
     actuators: Actuators | None = None,
+    sensor_numbers: Numbers | None = None,
     effects: tuple[AbstractEffect, ...] = (),
     effect_rows: tuple[Parameter, ...] = (),
 ) -> SubmergedBody | Mechanism:
@@ -68,6 +69,7 @@ def build(
 
     - `numbers`: value and row of every body entry and coefficient; zero where the physics has one that is absent.
     - `input_units`: SI units of inputs that have no symbol. `actuators`: those of a body; `numbers` has theirs too.
+    - `sensor_numbers`: value and row of each scale, offset and mounting angle of a column.
     - `ties`: numbers that follow from others; `numbers` has them with any value.
     - `coriolis`: of a body, one of `CORIOLIS`. `system`: in which the file gives its coefficients, as text.
     - `hull`: `length`, `diameter` (m; worked out from mass and inertia where absent), `reference_density` (kg/m³).
@@ -76,9 +78,11 @@ def build(
     not positive definite, with the coefficients that make it so.
     """
     hull = dict(hull or {})
-    rows = tuple(row for _, row in numbers.values())
+    of_sensors = sensor_numbers or {}
+    _require_unlike(numbers, of_sensors, where)
+    rows = tuple(row for _, row in (numbers | of_sensors).values())
     values = {key: number(value) for key, (value, _) in numbers.items()}
-    given = {key: value for key, (value, _) in numbers.items()}
+    given = {key: value for key, (value, _) in (numbers | of_sensors).items()}
     given |= _before(actuators or Actuators(), effects)
     tied = tied_values(ties, given, where)
     values |= {key: number(value) for key, value in tied.items() if key in numbers}
@@ -87,7 +91,7 @@ def build(
         hull = _sizes(values, hull)
     rows += effect_rows
     equations = dof or EQUATIONS
-    shown = tuple(output.channel for output in outputs)
+    shown = tuple(output.state for output in outputs)
     positions = _positions(equations, dict(prescribed), shown) if kind == "submerged-body" else equations
     positions += memory_states(effects)
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
@@ -95,19 +99,27 @@ def build(
         name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes, system=system,
         ties=ties, input_units=tuple((input_units or {}).items()),
     )  # fmt: skip
+    density = hull.get("reference_density", STANDARD_DENSITY)
     if kind == "mechanism":
         vehicle = _mechanism(values, layout, effects, where)
     else:
-        density = hull.get("reference_density", STANDARD_DENSITY)
         devices = (actuators or Actuators()).in_water(density).with_values(values)
         body = _body(values, layout, effects, devices, density, where)
         vehicle = dataclasses.replace(body, coriolis=coriolis)
+    sensors = Sensors({key: number(value) for key, (value, _) in of_sensors.items()}, density)
+    vehicle = dataclasses.replace(vehicle, sensors=sensors)
     if ties:
-        vehicle = vehicle.with_values({})  # the numbers of effects that follow others
-    check_outputs(vehicle, where)
+        vehicle = vehicle.with_values({})  # the numbers of effects and sensors that follow others
     check_effects(vehicle, where)
     require_inertia(vehicle, where)
     return vehicle
+
+
+def _require_unlike(numbers: Numbers, of_sensors: Numbers, where: str) -> None:
+    """Refuse a number of a column that an actuator of the same name has too."""
+    for name in of_sensors:
+        if name in numbers:
+            raise InputError(f"{where}: {name}", "is a number of an actuator and of a column", "rename the actuator")
 
 
 def _before(devices: Actuators, effects: tuple[AbstractEffect, ...]) -> dict[str, float]:

@@ -133,16 +133,6 @@ def check_coefficients(terms: Mapping[str, Derivative | None], layout: Layout, w
         raise InputError(f"{where}: coefficients.{same[1]}", f"says what {same[0]} says", "delete one")
 
 
-def check_outputs(vehicle: SubmergedBody | Mechanism, where: str) -> None:
-    """Refuse channels that the vehicle does not produce."""
-    layout = vehicle.layout
-    own = (f for e in layout.equations for f in (e, f"{e}_rate"))
-    known = tuple(CHANNEL_UNITS) if isinstance(vehicle, SubmergedBody) else tuple(own)
-    for channel in layout.channels:
-        if channel not in known:
-            raise unknown_key(f"{where}: outputs.{channel}", known, channel)
-
-
 def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
     """Refuse effects on what the vehicle lacks, and one that is there twice."""
     layout = vehicle.layout

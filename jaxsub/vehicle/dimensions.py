@@ -21,6 +21,7 @@ _DIMENSIONS = {
     "N": ("force", "N"),
     "kg/m³": ("density", "kg/m^3"),
     "m³": ("volume", "m^3"),
+    "Pa": ("pressure", "Pa, kPa or dbar"),
     "K": ("temperature", "degC or K"),
 }
 _NAMES = {
@@ -58,8 +59,8 @@ def _taken(layout: Layout) -> Iterator[tuple[str, str]]:
     for pairs, units in ((layout.prescribed, CHANNEL_UNITS), (layout.environment, _ENVIRONMENT_UNITS)):
         for name, column in pairs:
             yield column, units[name] if body else ""
-    for channel in layout.channels:
-        yield channel, CHANNEL_UNITS[channel] if body else ""
+    for output in layout.outputs:
+        yield output.column, layout.unit(output.name)
 
 
 def _check(recording: Recording, column: str, stated: str, expected: str) -> None:

@@ -47,10 +47,21 @@ def position_rates(motion: Motion) -> dict[str, Signal]:
     }
 
 
+def rotation(phi: Float[Array, " *k"], theta: Float[Array, " *k"], psi: Float[Array, " *k"]) -> Float[Array, "*k 3 3"]:
+    r"""$R(\phi, \theta, \psi) = R_z(\psi)R_y(\theta)R_x(\phi)$, angles in rad: from turned axes to the fixed ones."""
+    (sf, cf), (st, ct), (sp, cp) = ((jnp.sin(angle), jnp.cos(angle)) for angle in (phi, theta, psi))
+    rows = (
+        (cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf),
+        (sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf),
+        (-st, ct * sf, ct * cf),
+    )
+    return jnp.stack([jnp.stack(jnp.broadcast_arrays(*row, cp * ct)[:3], -1) for row in rows], -2)
+
+
 def specific_force(
     motion: Motion, acceleration: Mapping[str, Signal], arm: tuple[float, float, float]
 ) -> dict[str, Array]:
-    r"""What an accelerometer at `arm` (m from the centre of gravity, body axes) shows, m/s².
+    r"""What an accelerometer at `arm` (m from the origin of the body's axes) shows, m/s².
 
     $f = \dot\nu_1 + \nu_2\times\nu_1 + \dot\nu_2\times l + \nu_2\times(\nu_2\times l) - R^T g$.
     """

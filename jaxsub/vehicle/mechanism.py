@@ -13,6 +13,7 @@ from ..effects import AbstractEffect, Motion, Signal
 from ..parameters import number
 from .actuation import RigActuation
 from .base import AbstractVehicle, Layout, timed
+from .sensors.sensors import Sensors
 
 
 class Mechanism(AbstractVehicle):
@@ -25,11 +26,13 @@ class Mechanism(AbstractVehicle):
     **Fields**
 
     - `coefficients`: SI, or any consistent units where the inertia is scaled to 1.
+    - `sensors`: scales and offsets of what is measured.
     """
 
     coefficients: dict[str, Float[Array, ""]]
     layout: Layout = eqx.field(static=True)
     effects: tuple[AbstractEffect, ...] = ()
+    sensors: Sensors = eqx.field(default_factory=Sensors)
 
     def mass_matrix(self) -> Float[Values, "n n"]:
         """I."""
@@ -40,13 +43,13 @@ class Mechanism(AbstractVehicle):
         return -self._matrix("D")
 
     def own_values(self) -> dict[str, Array]:
-        """The coefficients."""
-        return self.coefficients
+        """The coefficients, and the scales and offsets of sensors."""
+        return self.coefficients | self.sensors.numbers
 
     def with_own_values(self, values: Mapping[str, Values]) -> Self:
         """The same mechanism with other coefficients for those named."""
         updated = {name: number(values.get(name, old)) for name, old in self.coefficients.items()}
-        return dataclasses.replace(self, coefficients=updated)
+        return dataclasses.replace(self, coefficients=updated, sensors=self.sensors.with_values(values))
 
     def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:
         """Rates and positions by coordinate."""
@@ -82,7 +85,7 @@ class Mechanism(AbstractVehicle):
         """The rates themselves."""
         return motion.rates
 
-    def channels(self, motion: Motion, acceleration: Mapping[str, Signal]) -> dict[str, Signal]:
+    def channels(self, motion: Motion) -> dict[str, Signal]:
         """Each coordinate `q` and its rate `q_rate`."""
         coordinates = {name: motion.positions[name] for name in self.layout.equations}
         return coordinates | {f"{name}_rate": rate for name, rate in motion.rates.items()}

@@ -3,7 +3,7 @@ no rigid body has."""
 
 from collections.abc import Iterator
 
-from ..effects import EQUATIONS, GRAVITY, VELOCITIES, AbstractForce, ActuatorGain, derivative
+from ..effects import EQUATIONS, GRAVITY, VELOCITIES, ActuatorGain, derivative
 from ..findings import Finding
 from .base import AbstractVehicle, Layout
 from .checks import inputs_of
@@ -58,7 +58,7 @@ def _locked(body: SubmergedBody, where: str) -> Iterator[Finding]:
 
 def _twice(body: SubmergedBody, where: str) -> Iterator[Finding]:
     for effect in body.effects:
-        if isinstance(effect, AbstractForce) and effect.term in body.has:
+        if effect.term in body.has:
             said = "[model] coriolis" if effect.term == "coriolis" else f"the coefficient {effect.term}"
             what = f"says what {said} says, so no recording can tell them apart"
             yield Finding("said-twice", "warning", f"{where}: effects ({effect.label})", what, "delete one")

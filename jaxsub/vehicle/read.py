@@ -11,10 +11,11 @@ from ..effects import (
     AbstractEffect,
     SmoothForce,
     derivative,
-    number_fields,
-    options,
+    option_fields,
     parameter_table,
+    quantity_of,
     vocabulary,
+    with_numbers,
 )
 from ..errors import InputError
 from ..parameters import Parameter
@@ -24,7 +25,9 @@ from .build import BODY_KEYS, VECTORS, build
 from .coefficient_units import coefficient_unit
 from .mechanism import Mechanism
 from .scales import check_scaled, read_scales
-from .schema import Table, read_inputs, read_number, read_option, read_outputs, read_pairs, unknown_key
+from .schema import Table, read_number, read_option, unknown_key
+from .sensors import quantities_of
+from .sensors.read import Reading, read_columns, read_outputs
 from .submerged_body import CORIOLIS, SubmergedBody
 from .ties import Tie, read_tie
 from .toml import check_tree, read_toml
@@ -63,17 +66,22 @@ def vehicle_from(
     body, extra = _read_body(top) if kind == "submerged-body" else ({}, {})
     if kind == "mechanism":
         top.required("dof")
-    inputs, units = _read_inputs(top.table("inputs"), kind == "submerged-body")
+    measured = Reading()
+    inputs, units = _read_inputs(top.table("inputs"), kind == "submerged-body", measured)
     names = tuple(name for name, _ in inputs)
     devices = read_actuators(top.table("actuators"), names, units, folder or Path())
     coefficients, system, ties = _read_coefficients(
         top.table("coefficients"), kind == "submerged-body", devices.input_units
     )
+    prescribed, _ = read_columns(top.table("prescribed"), ("scale", "offset"), measured)
+    environment, _ = read_columns(top.table("environment"), (), measured)
+    read_outputs(top.table("outputs"), top.names("dof") or (), kind == "submerged-body", measured)
     numbers = body | coefficients | devices.numbers
     # those with a symbol have their units by it
     named = [name for name in names if name in devices.input_units and not (body and name in INPUT_UNITS)]
+    quantities = quantities_of(measured.outputs, kind == "submerged-body")
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
-    built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds)
+    built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds, quantities)
     return build(
         where=where,
         name=top.word("name"),
@@ -83,13 +91,14 @@ def vehicle_from(
         hull=extra,
         coriolis=_read_model(top.table("model")),
         system=system,
-        ties=(*ties, *devices.ties),
+        ties=(*ties, *devices.ties, *measured.ties),
         inputs=inputs,
         input_units={name: devices.input_units[name] for name in named},
         actuators=devices.actuators,
-        prescribed=read_pairs(top.table("prescribed")),
-        environment=read_pairs(top.table("environment")),
-        outputs=read_outputs(top.table("outputs")),
+        prescribed=prescribed,
+        environment=environment,
+        outputs=tuple(measured.outputs),
+        sensor_numbers=measured.numbers,
         effects=(*(effect for effect, _ in devices.stages), *built_in),
         effect_rows=(*(row for _, row in devices.stages), *effect_rows),
     )
@@ -101,9 +110,9 @@ def _read_model(table: Table) -> str:
     return table.choice("coriolis", CORIOLIS) if "coriolis" in table.data else CORIOLIS[0]
 
 
-def _read_inputs(table: Table, body: bool) -> tuple[tuple[tuple[str, str], ...], dict[str, str]]:
+def _read_inputs(table: Table, body: bool, measured: Reading) -> tuple[tuple[tuple[str, str], ...], dict[str, str]]:
     """The pairs of `[inputs]`, and the SI units of those for which that is known."""
-    pairs, stated = read_inputs(table)
+    pairs, stated = read_columns(table, ("unit", "scale", "offset"), measured)
     known = {name: INPUT_UNITS[name] for name, _ in pairs if body and name in INPUT_UNITS}
     for name, unit in known.items():
         if name in stated and not same_dimension(stated[name], unit):
@@ -164,9 +173,9 @@ def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str
 
 
 def _read_effects(
-    entries: Any, where: str, kinds: dict[str, type[AbstractEffect]]
+    entries: Any, where: str, kinds: dict[str, type[AbstractEffect]], quantities: dict[str, str]
 ) -> tuple[tuple[AbstractEffect, ...], tuple[Parameter, ...]]:
-    """The `[[effects]]` of a file."""
+    """The `[[effects]]` of a file; `quantities` of its outputs are as `Facts` has them."""
     effects, rows = [], []
     if not isinstance(entries, list):
         raise InputError(f"{where}: effects", "is not a list of tables", "write [[effects]] above each effect")
@@ -175,10 +184,12 @@ def _read_effects(
     for number, entry in enumerate(entries, 1):
         table = Table(entry, where, f"effects[{number}]")
         kind = kinds[table.choice("effect", tuple(kinds))]
-        chosen = {field.name.rstrip("_"): field for field in _option_fields(kind)}
+        chosen = {field.name.rstrip("_"): field for field in option_fields(kind)}
         table.only(("effect", "expression", "parameters", *chosen))
         place = f"{where}: effects[{number}]"
         named = {field.name: read_option(table, key, field) for key, field in chosen.items()}
+        if any("of_output" in field.metadata for field in dataclasses.fields(kind)):
+            named["quantity"] = quantity_of(named["channel"], quantities)
         try:
             effect = kind(**named)
         except InputError as error:  # options that do not go together; it does not know the file
@@ -191,18 +202,13 @@ def _read_effects(
         for symbol, item in given.items():
             field = symbols[symbol]
             values[field], table_rows[field] = read_number(item, f"{place}.parameters.{symbol}", table_rows[field])
-        effect = kind(**options(effect), **values)
+        effect = with_numbers(effect, values)
         if table.data.get("expression", effect.expression) != effect.expression:
             remedy = "delete the line; it says for a reader what the effect computes"
             raise InputError(f"{place}.expression", f"is not {effect.expression!r}", remedy)
         effects.append(effect)
         rows += list(table_rows.values())
     return tuple(effects), tuple(rows)
-
-
-def _option_fields(kind: type[AbstractEffect]) -> list[dataclasses.Field]:
-    numeric = {field.name for field in number_fields(kind)}
-    return [field for field in dataclasses.fields(kind) if field.name not in numeric]
 
 
 def _rows(effect: AbstractEffect, place: str) -> dict[str, Parameter]:

@@ -8,12 +8,10 @@ from typing import Any
 from ..errors import InputError, nearest
 from ..parameters import Parameter
 from ..units import UnknownUnit, is_si, same_dimension, si_unit
-from .base import Output
 
 # the largest size of a number, and its inverse the smallest: what a model makes of several such is a float still
 _LARGEST = 1e60
 _NUMBER_KEYS = ("value", "fixed", "free", "bounds", "prior_std", "prior_mean", "unit")
-_ACCELEROMETER = ("ax", "ay", "az")
 
 
 class Table:
@@ -202,52 +200,10 @@ def _bounds(value: Any, place: str) -> tuple[float, float]:
     return low, high
 
 
-def read_pairs(table: Table) -> tuple[tuple[str, str], ...]:
-    """(name in the model, column of the recording) pairs of `[prescribed]` and `[environment]`."""
-    return tuple((key, _column(column, table.place(key), key)) for key, column in table.items())
-
-
-def read_inputs(table: Table) -> tuple[tuple[tuple[str, str], ...], dict[str, str]]:
-    """The pairs of `[inputs]`, and the SI units of those that state one: `name = { column = "c", unit = "V" }`."""
-    pairs, units = [], {}
-    for name, entry in table.items():
-        if isinstance(entry, dict):
-            own = table.table(name)
-            own.only(("column", "unit"))
-            if "unit" in own.data:
-                units[name] = read_unit(own.data["unit"], own.place("unit"))
-            entry = own.required("column")
-        pairs.append((name, _column(entry, table.place(name), name)))
-    return tuple(pairs), units
-
-
-def _column(column: Any, place: str, key: str) -> str:
+def read_column(column: Any, place: str, key: str) -> str:
+    """The name of a recording's column."""
     if not isinstance(column, str) or not column.strip():
         raise InputError(place, f"{column!r:.60} is not a column name", f'write {key} = "column"')
     if re.search(r"[\[\]]", column):
         raise InputError(place, f"{column!r} has brackets", "name the column without its unit")
     return column
-
-
-def read_outputs(table: Table) -> tuple[Output, ...]:
-    """The measured channels of `[outputs.*]`."""
-    outputs = []
-    for channel in table.data:
-        entry = table.table(channel)
-        entry.only(("sigma", "lever_arm"))
-        sigma = entry.data.get("sigma", "estimate")
-        if sigma != "estimate":
-            sigma = read_finite(sigma, entry.place("sigma"))
-            if sigma <= 0.0:
-                raise InputError(entry.place("sigma"), f"is {sigma:g}", 'give a positive number or "estimate"')
-        arm = entry.data.get("lever_arm", [0.0, 0.0, 0.0])
-        if "lever_arm" in entry.data and channel not in _ACCELEROMETER:
-            remedy = 'give it to ax, ay or az; other channels take [[effects]] effect = "sensor-lever-arm"'
-            raise InputError(entry.place("lever_arm"), f"{channel} does not use it", remedy)
-        if not isinstance(arm, list) or len(arm) != 3:
-            raise InputError(entry.place("lever_arm"), f"is {arm!r:.60}", "give three numbers in m")
-        x, y, z = (read_finite(item, entry.place("lever_arm")) for item in arm)
-        outputs.append(Output(channel, None if sigma == "estimate" else sigma, (x, y, z)))
-    if not outputs:
-        raise InputError(f"{table.where}: outputs", "names no measured channel", "add [outputs.r] and the like")
-    return tuple(outputs)

@@ -17,9 +17,10 @@ from .actuators import Actuators, stage_numbers
 from .base import AbstractVehicle, Layout, timed
 from .damping import Damping
 from .inertia import Inertia, sparse
-from .kinematics import position_rates, specific_force
+from .kinematics import position_rates
 from .products import Products, derivatives
 from .restoring import Restoring
+from .sensors.sensors import Sensors
 
 _POSITIONS = ("phi", "theta", "psi", "x", "y", "z")
 CURRENT = ("current_north", "current_east")
@@ -43,6 +44,7 @@ class SubmergedBody(AbstractVehicle):
     - `inertia`, `damping`, `products`, `restoring`: of rigid body and added mass, of linear damping, of all other
       derivatives, of weight and buoyancy.
     - `actuators`: what pushes, lifts and weighs by a command, beside the derivatives by inputs.
+    - `sensors`: scales, offsets and mountings of what is measured.
     - `cruise`: operating speed U_c, m/s.
     - `coriolis`: `linear` about the operating speed, where added mass has its share in the linear derivatives; `full`
       for rigid body and added mass; `rigid-body` where derivatives such as `X_wq` hold what is the added mass's.
@@ -57,6 +59,7 @@ class SubmergedBody(AbstractVehicle):
     effects: tuple[AbstractEffect, ...] = ()
     coriolis: str = eqx.field(static=True, default="linear")
     actuators: Actuators = eqx.field(default_factory=Actuators)
+    sensors: Sensors = eqx.field(default_factory=Sensors)
 
     def mass_matrix(self) -> Float[Values, "n n"]:
         """Inertia of the free equations."""
@@ -69,7 +72,7 @@ class SubmergedBody(AbstractVehicle):
     def own_values(self) -> dict[str, Array]:
         """Body data and coefficients."""
         parts = (self.inertia.rigid, self.inertia.added, self.damping.coefficients, self.products.coefficients)
-        parts = (*parts, self.restoring.values, self.actuators.values(), {"speed": self.cruise})
+        parts = (*parts, self.restoring.values, self.actuators.values(), {"speed": self.cruise}, self.sensors.numbers)
         return {name: value for part in parts for name, value in part.items()}
 
     def with_own_values(self, values: Mapping[str, Values]) -> Self:
@@ -86,6 +89,7 @@ class SubmergedBody(AbstractVehicle):
             restoring=dataclasses.replace(self.restoring, values=update(self.restoring.values)),
             cruise=number(values.get("speed", self.cruise)),
             actuators=self.actuators.with_values(values),
+            sensors=self.sensors.with_values(values),
         )
 
     def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:
@@ -94,6 +98,8 @@ class SubmergedBody(AbstractVehicle):
         names += [f"environment {n}" for n, _ in self.layout.environment]
         columns, time = timed(self.layout, signals, state[..., 0])
         known: dict[str, Signal] = dict(zip(names, columns, strict=True))
+        for name, _ in self.layout.prescribed:
+            known[name] = self.sensors.true(name, known[name])
         pick = lambda kind: {n.removeprefix(kind): v for n, v in known.items() if n.startswith(kind)}
         known |= {name: state[..., i] for i, name in enumerate(self.layout.states)}
         zero = jnp.zeros_like(state[..., 0])
@@ -133,10 +139,11 @@ class SubmergedBody(AbstractVehicle):
 
     @property
     def has(self) -> frozenset[str]:
-        """Its derivatives, by symbol, those of its actuators, and `coriolis` where that is not linear."""
+        """Also its derivatives, by symbol, those of its actuators, and `coriolis` where that is not linear."""
         names = (*self.inertia.added, *self.damping.coefficients, *self.products.coefficients)
         turning = () if self.coriolis == "linear" else ("coriolis",)
-        return frozenset((*(term.name for term in derivatives(names).values()), *self.actuators.names, *turning))
+        own = (*(term.name for term in derivatives(names).values()), *self.actuators.names, *turning)
+        return super().has.union(own)
 
     @property
     def fixed_gains(self) -> tuple[str, ...]:
@@ -158,19 +165,14 @@ class SubmergedBody(AbstractVehicle):
         """Euler rates and velocity over ground."""
         return position_rates(motion)
 
-    def channels(self, motion: Motion, acceleration: Mapping[str, Signal]) -> dict[str, Signal]:
+    def channels(self, motion: Motion) -> dict[str, Signal]:
         """Velocities, attitude, position and what follows from them."""
         velocities = {VELOCITIES[e]: motion.rates[e] for e in EQUATIONS}
         rates = position_rates(motion)
         u, v, w = velocities["u"], velocities["v"], velocities["w"]
         found = velocities | {name: motion.positions[name] for name in _POSITIONS}
         found |= {"depth": motion.positions["z"], "depth_rate": rates["z"], "heading_rate": rates["psi"]}
-        found["speed"] = jnp.sqrt(u**2 + v**2 + w**2 + 1e-12)
-        for output in self.layout.outputs if acceleration else ():
-            if output.channel in ("ax", "ay", "az"):
-                full = {e: acceleration.get(e, jnp.zeros_like(u)) for e in EQUATIONS}
-                found[output.channel] = specific_force(motion, full, output.lever_arm)[output.channel]
-        return found
+        return found | {"speed": jnp.sqrt(u**2 + v**2 + w**2 + 1e-12)}
 
     @property
     def _actuation(self) -> BodyActuation:

@@ -29,12 +29,13 @@ class Tie:
     **Fields**
 
     - `name`: the number that follows. `text`: the expression, as in the vehicle file; its numbers are SI.
-    - `names`: those that it follows.
+    - `names`: those that it follows. `section`: of the vehicle file, that has it.
     """
 
     name: str
     text: str
     names: tuple[str, ...]
+    section: str = "coefficients"
 
     def of(self, values: Mapping[str, Any]) -> Any:
         """The number for `values` of the others: floats or arrays, differentiable by them."""
@@ -42,8 +43,8 @@ class Tie:
         return _value(_parsed(self.text, self.names), named)
 
 
-def read_tie(name: str, text: str, place: str) -> Tie:
-    """The tie that a vehicle file gives in place of a number.
+def read_tie(name: str, text: str, place: str, section: str = "coefficients") -> Tie:
+    """The tie that a vehicle file gives in place of a number of its `section`.
 
     **Raises** `InputError` for what is no expression of other numbers.
     """
@@ -59,7 +60,7 @@ def read_tie(name: str, text: str, place: str) -> Tie:
         raise InputError(place, f"{text!r:.60} is no expression", _HINT) from error
     except ArithmeticError:
         pass  # at one for each; its own numbers are judged below
-    return Tie(name, text, names)
+    return Tie(name, text, names, section)
 
 
 def tied_values(ties: tuple[Tie, ...], values: Mapping[str, float], where: str) -> dict[str, float]:
@@ -69,7 +70,7 @@ def tied_values(ties: tuple[Tie, ...], values: Mapping[str, float], where: str) 
     """
     found, tied = {}, {tie.name for tie in ties}
     for tie in ties:
-        place = f"{where}: {'actuators' if '.' in tie.name else 'coefficients'}.{tie.name}"
+        place = f"{where}: {tie.section}.{tie.name}"
         for name in tie.names:
             if name in tied:
                 raise InputError(place, f"follows {name}, which follows others", "write it in terms of those")

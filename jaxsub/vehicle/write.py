@@ -11,8 +11,9 @@ from ..errors import OutputError
 from ..parameters import Parameter
 from ..storage import written_whole
 from .actuators import Actuators, actuator_tables
-from .base import AbstractVehicle, Layout
+from .base import AbstractVehicle
 from .build import BODY_KEYS, VECTORS
+from .sensors import column_entry, output_tables
 from .submerged_body import CORIOLIS, SubmergedBody
 
 
@@ -44,7 +45,7 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
             document["model"] = {"coriolis": vehicle.coriolis}
     coefficients, tied = tomlkit.table(), {tie.name: tie.text for tie in layout.ties}
     devices = vehicle.actuators if isinstance(vehicle, SubmergedBody) else Actuators()
-    for name in (name for name in own if name not in devices.values()):
+    for name in (name for name in own if name not in devices.values() | vehicle.sensors.numbers):
         if name in tied:
             coefficients[name] = tied[name]
         elif not isinstance(vehicle, SubmergedBody) or name not in _body_names():
@@ -52,35 +53,26 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
             unit = "" if isinstance(vehicle, SubmergedBody) else row.unit
             coefficients[name] = _number_table(own[name], row, Parameter(name), unit)
     document["coefficients"] = coefficients
+    said = lambda name: tied.get(name) or _number_table(own[name], rows.get(name), Parameter(name, free=False))
+    entry = lambda name, column: column_entry(
+        name, column, dict(layout.input_units).get(name, ""), vehicle.sensors, said
+    )
     if layout.inputs:
-        document["inputs"] = {name: _input(column, layout, name) for name, column in layout.inputs}
+        document["inputs"] = {name: entry(name, column) for name, column in layout.inputs}
     tables, stages = actuator_tables(devices, vehicle.effects, rows, tied, _number_table)
     if devices.items:
         document["actuators"] = tables
-    for section, pairs in (("prescribed", layout.prescribed), ("environment", layout.environment)):
-        if pairs:
-            document[section] = dict(pairs)
-    outputs = tomlkit.table()
-    for output in layout.outputs:
-        outputs[output.channel] = {"sigma": "estimate" if output.sigma is None else output.sigma}
-        if any(output.lever_arm):
-            outputs[output.channel]["lever_arm"] = list(output.lever_arm)
-    document["outputs"] = outputs
+    if layout.prescribed:
+        document["prescribed"] = {name: entry(name, column) for name, column in layout.prescribed}
+    if layout.environment:
+        document["environment"] = dict(layout.environment)
+    document["outputs"] = output_tables(layout.outputs, vehicle.sensors, said)
     effects = [effect for effect in vehicle.effects if not any(effect is stage for stage in stages)]
     if effects:
         document["effects"] = tomlkit.aot()
     for effect in effects:
         document["effects"].append(_effect_table(effect, rows))
     return tomlkit.dumps(document)
-
-
-def _input(column: str, layout: Layout, name: str) -> Any:
-    """The column of an input, with the unit of one that has no symbol."""
-    if not (unit := dict(layout.input_units).get(name)):
-        return column
-    table = tomlkit.inline_table()
-    table["column"], table["unit"] = column, unit
-    return table
 
 
 def _body_names() -> set[str]:

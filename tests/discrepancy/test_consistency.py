@@ -40,7 +40,7 @@ def simulated(*rms, seed=0, samples=400):
     own = np.sqrt(np.mean(np.concatenate(error) ** 2, axis=0)) / SIGMA
     sized = dict(zip(CHANNELS, own.tolist(), strict=True))
     left = {c: remainder(0.95 * value) for c, value in sized.items()}
-    return sized, left, assessed(error, recordings, CHANNELS, SIGMA)
+    return sized, left, assessed(error, recordings, dict(zip(CHANNELS, CHANNELS, strict=True)), SIGMA)
 
 
 def remainder(low):
@@ -79,7 +79,7 @@ def test_other_verdicts_are_left_alone(verdict):
 def test_a_model_that_diverges_on_the_test_run_is_not_none():
     times = 0.1 * np.arange(50)
     run = Recording("run", times, dict.fromkeys(CHANNELS, np.zeros(50)), "test")
-    wild = assessed([np.full((50, 2), np.nan)], [run], CHANNELS, SIGMA)
+    wild = assessed([np.full((50, 2), np.nan)], [run], dict(zip(CHANNELS, CHANNELS, strict=True)), SIGMA)
     lost = dict.fromkeys(CHANNELS, math.nan)
     found = compared(lost, lost, {c: remainder(math.nan) for c in CHANNELS}, quality(), wild)
     assert found == Explained(None, {}, False, False)

@@ -21,20 +21,21 @@ def body():
         "coefficients": {"N_delta_r": -1.0}, "inputs": {"rudder": "fin", "thrust": "T", "shaft_speed": "n"},
         "prescribed": {"u": "u_log", "theta": "pitch"},
         "environment": {"density": "rho", "ballast": "V", "temperature": "Tw", "altitude": "alt"},
-        "outputs": {channel: {"sigma": 0.1} for channel in CHANNEL_UNITS},
+        "outputs": {channel: {"sigma": 0.1} for channel in (*CHANNEL_UNITS, "pressure")},
     }  # fmt: skip
     return vehicle_from(data, "body.toml").layout
 
 
 DIMENSIONS = {name: si_unit(unit) for name, unit in CHANNEL_UNITS.items()} | {
     "fin": "rad", "T": "N", "n": "rad/s", "u_log": "m/s", "pitch": "rad", "rho": "kg/m³", "V": "m³", "Tw": "K",
-    "alt": "m",
+    "alt": "m", "pressure": "Pa",
 }  # fmt: skip
 WRITTEN = {
     "rad": ["rad", "deg", "°", "mrad"], "rad/s": ["rad/s", "deg/s", "rpm", "rev/s", "dps"], "m": ["m", "cm", "ft"],
     "m/s": ["m/s", "knot", "m.s-1"], "m/s²": ["m/s^2", "m s-2", "cm/s2"], "N": ["N", "kgf", "kN"],
     "kg/m³": ["kg/m3", "g/cm^3"], "m³": ["l", "cm^3"], "K": ["degC", "K"], "V": ["V", "mV"], "kg": ["kg", "g"],
     "1": ["1", "pct", "%", "unitless", "1e-3"], "s": ["s", "us", "ms"], "N m": ["Nm", "N.m"], "1/s": ["Hz"],
+    "Pa": ["dbar", "kPa", "Pa"],
 }  # fmt: skip
 
 

@@ -113,7 +113,7 @@ def _number(
 ) -> tuple[float, Parameter]:
     row = Parameter(name, item.unit_of(key, unit), free=False)
     if isinstance(entry, str):
-        ties.append(read_tie(name, entry, place))
+        ties.append(read_tie(name, entry, place, "actuators"))
         return 0.0, row
     value, row = read_number(entry, place, row)
     spec = item.keys[key]

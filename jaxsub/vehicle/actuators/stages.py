@@ -47,7 +47,7 @@ def read_stages(
         row = Parameter(row.name, per, free=False, lower=row.lower)
         entry, place = table.data[key], table.place(key)
         if isinstance(entry, str):
-            ties.append(read_tie(f"{actuator.name}.{key}", entry, place))
+            ties.append(read_tie(f"{actuator.name}.{key}", entry, place, "actuators"))
             found.append((kind(actuator=name), row))
             continue
         value, row = read_number(entry, place, row)
