@@ -76,7 +76,7 @@ class SensorMisalignment(_Mounting):
         """
         free = [VELOCITIES[e] for e in facts.equations] if facts.kind == "submerged-body" else []
         known = [*free, *(c for c in facts.channels if c in _TRIADS[2])] if free else []
-        make = lambda channel, sees: cls(channel, sees, quantity=quantity_of(channel, facts.quantities))
+        make = lambda channel, sees: cls(channel=channel, sees=sees, quantity=quantity_of(channel, facts.quantities))
         triads = [(c, shown, triad) for c, shown in facts.shown.items() for triad in _TRIADS if shown in triad]
         alone = [make(c, other) for c, shown, triad in triads for other in triad if other != shown and other in known]
         moved = {*free, *({*facts.shown.values()} & {*_TRIADS[2]} if free else ())}
@@ -137,7 +137,7 @@ class SensorLeverArm(_Mounting):
         """
         free = [VELOCITIES[e] for e in facts.equations] if facts.kind == "submerged-body" else []
         shows = lambda motion, axis: _TURNS.get(motion, {}).get(axis) in free
-        make = lambda channel, axis: cls(channel, axis, quantity=quantity_of(channel, facts.quantities))
+        make = lambda channel, axis: cls(channel=channel, axis=axis, quantity=quantity_of(channel, facts.quantities))
         alone = [make(c, axis) for c, motion in facts.shown.items() for axis in "xyz" if shows(motion, axis)]
         felt = [([c for c in triad if shows(c, x)], x) for triad in _ARMED for x in "xyz"]
         several = [(own, axis) for triad, axis in felt for own in instruments(facts, triad) if len(own) > 1]

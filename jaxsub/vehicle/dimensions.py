@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from ..effects import CHANNEL_UNITS
 from ..errors import InputError
 from ..recording import Recording
-from ..units import si_unit, unit_rate
+from ..units import ACCELERATIONS, si_unit, unit_rate
 from .base import Layout
 from .submerged_body import CURRENT
 
@@ -68,6 +68,8 @@ def _check(recording: Recording, column: str, stated: str, expected: str) -> Non
         return
     name = _NAMES.get(expected, expected)
     dimension, remedy = _DIMENSIONS.get(expected, (f"quantity in {name}", expected))
+    if expected == "m/s²" and stated == "kg" and column not in ACCELERATIONS:
+        remedy = "m/s^2 or g_n, since g is gram there"
     article = "an" if dimension[0] in "aeiou" else "a"
     what = f"{_NAMES.get(stated, stated)} is not the unit of {article} {dimension}"
     raise InputError(f"{recording.source}, column {column!r}", what, f"head it {column}[…] in {remedy}")
