@@ -94,13 +94,17 @@ def inputs_of(part: Actuator | AbstractEffect | Derivative | None) -> Iterator[s
                 yield from value
 
 
-def check_coordinates(layout: Layout, where: str) -> None:
-    """Refuse coordinates of a mechanism that are too many, or whose names make one name mean two things."""
-    names = layout.equations
+def check_count(names: tuple[str, ...], where: str) -> None:
+    """Refuse coordinates of a mechanism that are too many."""
     if len(names) > MOST_COORDINATES:
         # each of the inertia, damping and stiffness matrices is put together entry by entry
         what = f"names {len(names)} coordinates, whose matrices have {3 * len(names) ** 2} entries"
         raise InputError(f"{where}: dof", what, f"name {MOST_COORDINATES} at most")
+
+
+def check_coordinates(layout: Layout, where: str) -> None:
+    """Refuse coordinates of a mechanism whose names make one name mean two things."""
+    names = layout.equations
     known: dict[str, str] = {}
     for name in names:
         if not re.fullmatch(r"\w+", name):

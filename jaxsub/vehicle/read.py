@@ -22,6 +22,7 @@ from ..parameters import Parameter
 from ..units import same_dimension
 from .actuators import read_actuators
 from .build import BODY_KEYS, VECTORS, build
+from .checks import check_count
 from .coefficient_units import coefficient_unit
 from .mechanism import Mechanism
 from .scales import check_scaled, read_scales
@@ -66,6 +67,7 @@ def vehicle_from(
     body, extra = _read_body(top) if kind == "submerged-body" else ({}, {})
     if kind == "mechanism":
         top.required("dof")
+        check_count(top.names("dof") or (), where)
     measured = Reading()
     inputs, units = _read_inputs(top.table("inputs"), kind == "submerged-body", measured)
     names = tuple(name for name, _ in inputs)

@@ -24,6 +24,7 @@ GUIDES = (
     "index",
     "begin-a-vehicle-file",
     "add-a-vehicle",
+    "describe-your-sensors",
     "logs-and-data",
     "commands",
     "how-diagnosis-works",

@@ -231,7 +231,7 @@ KEYS = st.sampled_from(
 CHANNELS = ["r", "u", ["u", "v"], "psi", "pressure", "beam", ["latitude", "longitude"], "ax", "depth", "speed"]
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.sampled_from(CHANNELS), st.dictionaries(KEYS, ENTRIES, max_size=4))
 def test_any_table_is_read_and_written_or_refused_in_one_line(channel, entries):
     """Claim: no table of an output ends in another error, and what is accepted is read back as it was."""

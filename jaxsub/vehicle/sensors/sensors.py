@@ -76,7 +76,7 @@ class Sensors(eqx.Module):
             return (value - output.origin[at]) * radii(output.origin[0])[at]
         return value
 
-    def _line(self, name: str) -> tuple[Array | None, Array | None]:
+    def _line(self, name: str) -> tuple[Values | None, Values | None]:
         return self.numbers.get(f"{name}.scale"), self.numbers.get(f"{name}.offset")
 
     def _water(self, output: Output) -> float | None:
