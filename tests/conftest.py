@@ -8,8 +8,8 @@ import warnings
 from collections.abc import Iterator
 
 import jax
-import jaxtyping
 import pytest
+import typechecking
 from hypothesis import settings
 
 # the same examples at every run
@@ -26,7 +26,7 @@ if jax.__version_info__[:2] == (0, 10):
     quick = "--xla_cpu_use_fusion_emitters=false --xla_cpu_parallel_codegen_split_count=1"
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {quick}"
 # Before any test imports jaxsub, since only modules imported later are checked.
-jaxtyping.install_import_hook("jaxsub", "typechecking.checked")
+typechecking.install("jaxsub")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -86,9 +86,11 @@ def visible(value: Any) -> Any:
 
     What is no text stays, and what was marked as safe stays so. Line breaks and tabs stay.
     """
-    if not isinstance(value, str) or all(map(_shows, value)):
+    # each letter is asked for once: a page with its pictures has millions
+    hidden = {letter for letter in set(value) if not _shows(letter)} if isinstance(value, str) else set()
+    if not hidden:
         return value
-    shown = "".join(letter if _shows(letter) else f"[U+{ord(letter):04X}]" for letter in value)
+    shown = "".join(f"[U+{ord(letter):04X}]" if letter in hidden else letter for letter in value)
     return Markup(shown) if isinstance(value, Markup) else shown
 
 
