@@ -44,6 +44,7 @@ _STYLE: dict[Any, Any] = {
     "axes.spines.right": False,
     "axes.titlelocation": "left",
     "axes.titlesize": 9.5,
+    "axes.titley": 1.0,  # no axis has ticks above it, and matplotlib need not look for them
     "axes.unicode_minus": True,
     "xtick.color": GREY,
     "ytick.color": GREY,
@@ -96,9 +97,13 @@ def new_figure(width: float, height: float) -> Figure:
 
 def png(figure: Figure) -> bytes:
     """The figure as a PNG, sharp on a screen with two pixels a point."""
-    figure.align_ylabels()
     figure.set_dpi(_DPI)
     canvas = FigureCanvasAgg(figure)
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+    figure.set_layout_engine("none")
+    # after the layout, which would place each label of a column once for all others and comes to the same margins
+    figure.align_ylabels()
     canvas.draw()
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
     buffer = io.BytesIO()
