@@ -56,7 +56,8 @@ def _read_apart(path: Path) -> dict[str, Any]:
 
     Raises ValueError with the last line of what that process said where it fails.
     """
-    done = subprocess.run([sys.executable, "-c", _READ, str(path.absolute())], capture_output=True)
+    # -P: modules that lie in the folder where the user stands are none of ours
+    done = subprocess.run([sys.executable, "-P", "-c", _READ, str(path.absolute())], capture_output=True)
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         raise ValueError(said[-1] if done.returncode > 0 and said else "the reader of MATLAB files breaks off")

@@ -8,6 +8,7 @@ import numpy as np
 import pandas
 import pytest
 import xarray
+from file_examples import WRITERS, U
 
 from jaxsub.errors import InputError
 from jaxsub.recording import load
@@ -91,3 +92,11 @@ def test_damaged_netcdf_is_refused_without_a_complaint_on_stderr(tmp_path, capsy
     gc.collect()
     assert not complaints
     assert capsys.readouterr() == ("", "")
+
+
+def test_matlab_file_is_read_without_modules_of_the_current_folder(tmp_path, monkeypatch):
+    """Claim: a file called as a library, in the folder where the user stands, is not run."""
+    WRITERS["packed.mat"](tmp_path / "run.mat")
+    (tmp_path / "pymatreader.py").write_text("raise SystemExit('run')")
+    monkeypatch.chdir(tmp_path)
+    np.testing.assert_array_equal(load("run.mat").columns["u"], U)
