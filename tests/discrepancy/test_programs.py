@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from commands import environment
 
 TESTS = Path(__file__).parents[1]
 MOST = 56
@@ -37,7 +38,8 @@ print(json.dumps(counts))
 @pytest.fixture(scope="module")
 def counted():
     """Verdict and number of programs of two diagnoses, one after the other, in a process of their own."""
-    done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=900)
+    command = [sys.executable, "-c", PROGRAM]
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=900)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 
