@@ -55,6 +55,14 @@ def ended(files, out, *numbers, begin=()):
     return done.returncode, done.stderr.splitlines()[-1:], json.loads((out / "diagnosis.json").read_text())
 
 
+@pytest.fixture(scope="module")
+def killed(files, tmp_path_factory):
+    """What a diagnosis that was killed in its second round has left, and the folder where it lies."""
+    out = tmp_path_factory.mktemp("killed") / "out"
+    _, _, found = ended(files, out, signal.SIGKILL)
+    return found, out
+
+
 def test_an_interrupted_diagnosis_ends_with_the_answer_so_far(files, tmp_path):
     """Claim: Ctrl-C gives the effect accepted so far, on the test run, as an incomplete answer with its report."""
     code, said, found = ended(files, tmp_path / "out", signal.SIGINT)
@@ -67,18 +75,17 @@ def test_an_interrupted_diagnosis_ends_with_the_answer_so_far(files, tmp_path):
     assert not list(tmp_path.glob(".jaxsub-*"))
 
 
-def test_a_killed_diagnosis_leaves_the_answer_so_far(files, tmp_path):
+def test_a_killed_diagnosis_leaves_the_answer_so_far(killed):
     """Claim: kill -9 leaves the effect accepted so far and a vehicle that has it; no test run was looked at."""
-    _, _, found = ended(files, tmp_path / "out", signal.SIGKILL)
+    found, out = killed
     assert (found["complete"], found["verdict"], found["fit"]["held_out"]) == (False, "named", {})
-    improved = read_vehicle(tmp_path / "out" / "improved.toml")
+    improved = read_vehicle(out / "improved.toml")
     assert [effect.label for effect in improved.effects] == ["quadratic-damping[x]"]
 
 
-def test_the_next_call_goes_on_from_the_answer_so_far(files, tmp_path):
+def test_the_next_call_goes_on_from_the_answer_so_far(files, killed, tmp_path):
     """Claim: begun with the killed one's vehicle it names the same effect and numbers as one that nothing ended."""
-    ended(files, tmp_path / "killed", signal.SIGKILL)
-    begin = ["--begin", str(tmp_path / "killed" / "improved.toml")]
+    begin = ["--begin", str(killed[1] / "improved.toml")]
     code, _, found = ended(files, tmp_path / "again", begin=begin)
     _, _, whole = ended(files, tmp_path / "whole")
     assert code == 0 and found["complete"] and found["verdict"] == whole["verdict"] == "named"
