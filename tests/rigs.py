@@ -17,14 +17,14 @@ _SMALL = {"hull-compressibility": 3e9, "thermal-expansion": 3e4, "density-strati
 
 def stacked(vehicle: AbstractVehicle, recordings: list[Recording], substeps: int = 1) -> Runs:
     layout = vehicle.layout
-    columns = {"held": layout.held, "interpolated": layout.interpolated, "channels": layout.channels}
+    columns = {"held": layout.held, "interpolated": layout.interpolated, "channels": layout.columns}
     return stack_runs(recordings, **columns, angles=layout.angles, substeps=substeps)
 
 
 def driven(vehicle: AbstractVehicle, times: np.ndarray, seed: int, amplitude: float = 0.1, hold: int = 15) -> Recording:
     """A recording whose held inputs are random telegraph signals; what else it has to have, it has as a slow wave."""
     layout = vehicle.layout
-    columns = {name: np.full(len(times), np.nan) for name in layout.channels}
+    columns = {name: np.full(len(times), np.nan) for name in layout.columns}
     columns |= {name: 0.1 * np.sin(0.4 * times + i) for i, name in enumerate(layout.interpolated)}
     columns |= {name: prbs(len(times), hold, amplitude, 100 * seed + i) for i, name in enumerate(layout.held)}
     return Recording(f"run {seed}", times, columns, f"run {seed}")

@@ -13,7 +13,7 @@ from ..errors import InputError, nearest
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
 from ..simulate import Sampled, at_rest
-from ..vehicle import AbstractVehicle
+from ..vehicle import AbstractVehicle, wrapped_columns
 from .autopilot import REFERENCES, Autopilot
 
 _LOST = np.radians(60.0)
@@ -71,7 +71,7 @@ def fly(
     states, signals, outputs = (np.asarray(part) for part in flown)
     source = f"{layout.name}, {name}"
     _require_control(vehicle, source, times, states, signals)
-    measured = dict(zip(layout.channels, (outputs + draws).T, strict=True))
+    measured = dict(zip(layout.columns, wrapped_columns(layout.outputs, outputs + draws).T, strict=True))
     inputs = dict(zip((*layout.held, *layout.interpolated), signals.T, strict=True))
     return Recording(name, times, measured | inputs, source)
 
@@ -80,12 +80,12 @@ def _before(vehicle: AbstractVehicle, times: np.ndarray, given: Mapping[str, np.
     """The run before it is flown, fins at zero, and one sample longer: the last deflection has an interval too."""
     layout = vehicle.layout
     longer = np.append(times, 2.0 * times[-1] - times[-2])
-    columns = dict.fromkeys(layout.channels, np.full(len(longer), np.nan))
+    columns = dict.fromkeys(layout.columns, np.full(len(longer), np.nan))
     for column in (*layout.held, *layout.interpolated):
         samples = given.get(column, np.zeros(len(times)))
         columns[column] = np.append(samples, samples[-1])
     blank = Recording("flight", longer, columns, f"{layout.name}, given columns")
-    return stack_runs([blank], held=layout.held, interpolated=layout.interpolated, channels=layout.channels)
+    return stack_runs([blank], held=layout.held, interpolated=layout.interpolated, channels=layout.columns)
 
 
 @eqx.filter_jit

@@ -26,7 +26,9 @@ _PARTNERS = dict(zip("uvwpqr", ("x", "y", "z", "phi", "theta", "psi"), strict=Tr
 def state_scale(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values, " s"]:
     """For each state the noise of its channel, SI; else that of its rate or its integral over a second; else usual."""
     layout = vehicle.layout
-    known = dict(zip(layout.channels, sigma, strict=True))
+    plain = layout.plain
+    measured = zip(layout.outputs, sigma, strict=True)
+    known = {one.channel: size for one, size in measured if plain.get(one.channel) == one.column}
     if "depth" in known:
         known.setdefault("z", known["depth"])
     partner = _PARTNERS if layout.kind == "submerged-body" else {f"{e}_rate": e for e in layout.equations}

@@ -30,8 +30,9 @@ class Directions:
 
     **Fields**
 
-    - `names`, `size`: of the p coefficients, and what counts as all of each: its value, or where that is zero the
-      file's, or where both are its standard error.
+    - `names`, `size`: of the p coefficients, and what counts as all of each: its value or the file's, whichever is
+      larger; of one that is zero in the file, such as a sensor's offset, its prior standard deviation at least; its
+      standard error where all those are zero.
     - `triangle`: (p, p) R of the Jacobian's QR decomposition, by relative changes.
     - `vectors`: (p, p), a direction in each column; `uncertainty`: (p,) of each, infinite where rounding hides it.
     """
@@ -48,6 +49,9 @@ class Directions:
         problem = fit.problem
         values, given = np.array(list(fit.values.values())), np.asarray(problem.prior_mean)
         size = np.maximum(np.abs(values), np.where(np.isfinite(given), np.abs(given), 0.0))
+        rows = {row.name: row for row in fit.vehicle.layout.free}
+        spread = np.array([rows[name].prior_std for name in fit.names])
+        size = np.where((given == 0.0) & np.isfinite(spread), np.maximum(size, spread), size)
         size = np.where(size > 0.0, size, np.array(list(fit.standard_errors.values())))
         triangle = _triangle(problem, fit.model, watch) * size
         return cls(fit.names, size, triangle, *_decompose(triangle))

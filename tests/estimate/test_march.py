@@ -70,7 +70,32 @@ def nonlinear():
     )  # fmt: skip
 
 
+def raw():
+    """A hull whose raw channels have arms, mountings, scales and offsets, some of them free."""
+    free = lambda value: {"value": value, "free": True}
+    placed = {"sigma": SIGMA, "lever_arm": [0.4, -0.1, 0.2], "mounting": [0.1, 0.0, free(0.05)]}
+    return vehicle_from(
+        {
+            "schema": 1, "name": "hull", "kind": "submerged-body", "dof": ["sway", "roll", "yaw"],
+            "body": {"mass": 60.0, "inertia": [1.0, 12.0, 12.0], "speed": 1.5, "centre_of_gravity": [0.0, 0.0, 0.02]},
+            "coefficients": {"Y_v": -40.0, "N_r": -20.0, "K_p": -1.0, "N_delta_r": -5.0},
+            "inputs": {"rudder": {"column": "dr", "scale": -1.0, "offset": free(0.02)}},
+            "prescribed": {"theta": {"column": "pitch", "offset": 0.1}},
+            "outputs": {
+                "dvl": placed | {"channel": ["u", "v", "w"], "frame": "FLU"},
+                "acc": placed | {"channel": ["ax", "ay", "az"], "offset": free(0.1)},
+                "log": placed | {"channel": "beam", "directions": [[1, 0, 1], [0, 1, 1]], "column": ["b", "c"]},
+                "gps": {"channel": ["latitude", "longitude"], "origin": [0.8, 0.1], "scale": 6e6},
+                "cell": {"channel": "pressure", "latitude": 0.8, "scale": 1e-4, "offset": free(0.3)},
+                "compass": {"channel": "psi", "frame": "ENU", "offset": 0.3},
+            },
+        },
+        "hull.toml",
+    )  # fmt: skip
+
+
 CASES = {
+    "raw channels": lambda: problem(raw(), lengths=(6, 5), amplitude=0.1),
     "derivatives": lambda: problem(nonlinear(), lengths=(6, 5), amplitude=0.1),
     "mechanism": lambda: problem(coupled(), substeps=2),
     "known start": lambda: problem(coupled(), known_start=True),
