@@ -22,7 +22,8 @@ def pressure(depth: Values, density: float | None, latitude: float | None) -> Va
     linear = 1.0 - _compression(latitude)
     # a root of what is not negative at any depth that a search may try
     root = xp.sqrt(xp.maximum(linear**2 - 4.0 * _CURVATURE * depth, 1e-6))
-    return _PER_DBAR * (linear - root) / (2.0 * _CURVATURE)
+    # the same as (linear - root) / (2 curvature), without the difference of two near numbers
+    return _PER_DBAR * 2.0 * depth / (linear + root)
 
 
 def depth_at(p: Values, density: float | None, latitude: float | None) -> Values:
