@@ -17,6 +17,7 @@ from ..effects import (
     AbstractForce,
     AbstractInstrument,
     Derivative,
+    Motion,
     alike,
     options,
 )
@@ -141,12 +142,13 @@ def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
     """Refuse effects on what the vehicle lacks, and one that is there twice."""
     layout = vehicle.layout
     labels = [effect.label for effect in vehicle.effects]
+    motion = _at_rest(vehicle) if any(isinstance(effect, AbstractForce) for effect in vehicle.effects) else None
     for index, effect in enumerate(vehicle.effects):
         place = f"{where}: effects[{index + 1}] ({effect.name})"
         if labels.index(effect.label) < index:
             raise InputError(place, f"{effect.label} is there twice", "delete one")
-        if isinstance(effect, AbstractForce):
-            _check_force(effect, vehicle, place)
+        if motion is not None and isinstance(effect, AbstractForce):
+            _check_force(effect, motion, vehicle, place)
         if isinstance(effect, AbstractFlow) and not isinstance(vehicle, SubmergedBody):
             raise InputError(place, f"moves water, which a {layout.kind} is not in", "delete it")
         if isinstance(effect, AbstractActuator) and effect.actuator not in dict(layout.inputs):
@@ -158,11 +160,16 @@ def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
                 raise InputError(place, f"no channel {channel}", f"use {hint}")
 
 
-def _check_force(effect: AbstractForce, vehicle: SubmergedBody | Mechanism, place: str) -> None:
-    """Refuse a force that the vehicle's motion cannot make, or that no free equation feels."""
+def _at_rest(vehicle: SubmergedBody | Mechanism) -> Motion:
+    """The motion at zero state and zero inputs."""
     layout = vehicle.layout
     state = jnp.zeros(len(layout.equations) + len(layout.positions))
-    motion = vehicle.motion(state, jnp.zeros(len(layout.held) + len(layout.interpolated)))
+    return vehicle.motion(state, jnp.zeros(len(layout.held) + len(layout.interpolated)))
+
+
+def _check_force(effect: AbstractForce, motion: Motion, vehicle: SubmergedBody | Mechanism, place: str) -> None:
+    """Refuse a force that such a `motion` cannot make, or that no free equation of the vehicle feels."""
+    layout = vehicle.layout
     try:
         felt = set(effect.force(motion)) & set(layout.equations)
     except KeyError as error:  # it looks for a motion, an actuator or a recorded column by its name

@@ -82,8 +82,10 @@ def vehicle_from(
     # those with a symbol have their units by it
     named = [name for name in names if name in devices.input_units and not (body and name in INPUT_UNITS)]
     quantities = quantities_of(measured.outputs, kind == "submerged-body")
-    kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)}
-    built_in, effect_rows = _read_effects(data.get("effects", []), where, kinds, quantities)
+    entries = data.get("effects", [])
+    # only for a file with effects, since the vocabulary opens the metadata of every installed package
+    kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)} if entries else {}
+    built_in, effect_rows = _read_effects(entries, where, kinds, quantities)
     return build(
         where=where,
         name=top.word("name"),
