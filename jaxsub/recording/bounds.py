@@ -9,9 +9,14 @@ _EXPANSION = 1000
 _ALWAYS = 2**28  # bytes
 
 
+def most(size: int) -> int:
+    """The bytes of samples that `size` bytes of a file may hold at most."""
+    return max(_ALWAYS, _EXPANSION * size)
+
+
 def require_plausible(source: str, claimed: int, size: int) -> None:
     """Raise InputError where `size` bytes of a file claim to hold `claimed` bytes of samples and cannot."""
-    if claimed > max(_ALWAYS, _EXPANSION * size):
+    if claimed > most(size):
         what = f"claims {_bytes(claimed)} of samples in {_bytes(size)}, above {_EXPANSION} times its size"
         raise InputError(source, what, "check that it is whole, or write it anew")
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") if hasattr(os, "sysconf") else claimed

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from jaxsub.errors import InputError, optional
-from jaxsub.recording.bounds import require_plausible
+from jaxsub.recording.bounds import most, require_plausible
 from jaxsub.recording.frames import Table
 from jaxsub.recording.reading import Contents, note, reading
 from jaxsub.units import TIME
@@ -20,11 +20,20 @@ from jaxsub.units import TIME
 _HEADER = 128  # bytes
 _COMPRESSED = 15  # MAT-File Format, table 1-1
 _PIECE = 2**20
-# warnings are about classes that it cannot read; they are refused when they are used
+# samples, what they are made into, and both as they are handed over
+_COPIES = 4
+# warnings are about classes that it cannot read; they are refused when they are used; what it takes beside itself is
+# limited where the system says how much that is, since SciPy makes room for a cell array of any size that is claimed
 _READ = """
 import pickle, sys, warnings
+from pathlib import Path
 warnings.simplefilter("ignore")
 import pymatreader
+used = Path("/proc/self/statm")
+if used.exists():
+    import resource
+    most = int(used.read_text().split()[0]) * resource.getpagesize() + int(sys.argv[2])
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
 found = pymatreader.read_mat(sys.argv[1])
 pickle.dump(found, sys.stdout.buffer, protocol=5)
 """
@@ -54,10 +63,12 @@ def read_matlab(path: Path, source: str) -> Contents:
 def _read_apart(path: Path) -> dict[str, Any]:
     """The file's variables, read in a process of its own, since some damaged files end the one that SciPy reads in.
 
+    That process may take no more memory than the file plausibly holds.
     Raises ValueError with the last line of what that process said where it fails.
     """
     # -P: modules that lie in the folder where the user stands are none of ours
-    done = subprocess.run([sys.executable, "-P", "-c", _READ, str(path.absolute())], capture_output=True)
+    command = [sys.executable, "-P", "-c", _READ, str(path.absolute()), str(_COPIES * most(path.stat().st_size))]
+    done = subprocess.run(command, capture_output=True)
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         raise ValueError(said[-1] if done.returncode > 0 and said else "the reader of MATLAB files breaks off")

@@ -2,6 +2,7 @@
 
 import gc
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -100,3 +101,14 @@ def test_matlab_file_is_read_without_modules_of_the_current_folder(tmp_path, mon
     (tmp_path / "pymatreader.py").write_text("raise SystemExit('run')")
     monkeypatch.chdir(tmp_path)
     np.testing.assert_array_equal(load("run.mat").columns["u"], U)
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not say what a process takes")
+def test_matlab_file_takes_no_more_memory_than_it_may_hold(tmp_path):
+    """Claim: a cell array that claims 2³⁰ cells in some hundred bytes is refused before there is room for them."""
+    WRITERS["mat"](tmp_path / "whole.mat")
+    of_two, of_many = (b"\5\0\0\0\b\0\0\0\1\0\0\0" + count.to_bytes(4, "little") for count in (2, 2**30))
+    whole = (tmp_path / "whole.mat").read_bytes()
+    assert whole.count(of_two) == 1
+    (tmp_path / "run.mat").write_bytes(whole.replace(of_two, of_many))
+    assert "Unable to allocate 8.00 GiB" in refusal(tmp_path / "run.mat")
