@@ -194,11 +194,12 @@ class SensorLeverArm(_Mounting):
 def instruments(facts: Facts, motions: Sequence[str]) -> list[list[str]]:
     """The channels that show some of `motions`, those of one instrument together: `dvl_u` and `dvl_v`, or `u` and `v`.
 
-    Of one instrument are those whose names differ by their motions alone.
+    Of one instrument are those whose names begin alike, up to the last `_`, and those that bear their motions' names.
     """
     found: dict[str, list[str]] = {}
     for motion in motions:
         for channel, shown in facts.shown.items():
             if shown == motion:
-                found.setdefault(channel.removesuffix(motion), []).append(channel)
+                instrument = "" if channel == motion else channel.rpartition("_")[0] or channel
+                found.setdefault(instrument, []).append(channel)
     return list(found.values())
