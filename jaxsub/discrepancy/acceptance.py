@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects import AbstractEffect
+from ..effects import AbstractEffect, AbstractMemory
 from ..estimate import Ended, Fit, substeps_for, substeps_unseen
 from ..likelihood import Disturbance
 from ..vehicle import AbstractVehicle
@@ -108,10 +108,12 @@ class ModelFitter:
         if substeps > joined.runs.substeps:
             finer = dataclasses.replace(model.fit, runs=dataclasses.replace(model.fit.runs, substeps=substeps))
             joined = fit_with(model.view, finer, effects, self.file, near)
-        substeps = substeps_unseen(joined.vehicle, joined.runs, joined.start, joined.sigma)
-        if substeps > joined.runs.substeps:
-            runs = dataclasses.replace(joined.runs, substeps=substeps)
-            joined = refit(dataclasses.replace(joined, runs=runs), joined.vehicle)
+        if any(isinstance(effect, AbstractMemory) for effect in effects):
+            # states of their own may turn far within a step that all else is followed by
+            substeps = substeps_unseen(joined.vehicle, joined.runs, joined.start, joined.sigma)
+            if substeps > joined.runs.substeps:
+                runs = dataclasses.replace(joined.runs, substeps=substeps)
+                joined = refit(dataclasses.replace(joined, runs=runs), joined.vehicle)
         view = look(joined, disturbance, with_scaled_effects(model.view.vehicle, effects, 1.0))
         return fitted_model(joined, view, (*model.added, *effects))
 

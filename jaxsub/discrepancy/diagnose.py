@@ -65,7 +65,7 @@ def diagnose(
     until = limited(progress, budget, stop)
     progress("fitting the baseline")
     start = fit(vehicle, batch(vehicle, train).padded())
-    if bool(start.result == RESULTS.nan_start):
+    if RESULTS[start.result] == RESULTS[RESULTS.nan_start]:
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
         raise InputError(vehicle.layout.name, "the model does not run from its starting values", remedy)
     progress("following the recordings")

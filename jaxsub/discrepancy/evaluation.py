@@ -1,12 +1,13 @@
 """Models simulated along the test runs, once, after the last decision."""
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import batch, channel_rms, initial_guess, search
+from ..estimate import channel_rms, initial_guess, search, side_by_side
 from ..likelihood import follow, residual_outputs
 from ..recording import Recording
 from ..recording.runs import Runs
@@ -46,10 +47,13 @@ def evaluated(
 
     The batches are as large and as long as that of the runs `train`, so that no other programs are needed.
     """
-    runs, size = batch(vehicle, [*train, *test]).padded(), len(train)
+    runs, size = side_by_side(vehicle, [*train, *test]).padded(), len(train)
     found = []
     for model in models:
-        finer = dataclasses.replace(runs, substeps=max(runs.substeps, model.view.runs.substeps))
+        # as short steps as the model was fitted with, also where the test runs are sampled more coarsely
+        fitted, longest = model.view.runs, lambda batch: float(np.max(np.asarray(batch.steps)))
+        steps = math.ceil(fitted.substeps * longest(runs) / longest(fitted) - 1e-9)
+        finer = dataclasses.replace(runs, substeps=max(runs.substeps, steps))
         predicted, errors = [], []
         for first in range(size, size + len(test), size):
             chosen = range(first, min(first + size, size + len(test)))

@@ -1,7 +1,7 @@
 """Estimation: one `fit`, one `Fit`, and the methods that may do it."""
 
 from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_residuals
-from .batches import batch
+from .batches import batch, side_by_side
 from .combined import Chain, Global
 from .disturbance import estimate_disturbance
 from .ends import Ends, ends
@@ -63,6 +63,7 @@ __all__ = [
     "search",
     "share_for",
     "shares_at_once",
+    "side_by_side",
     "state_channels",
     "substeps_for",
     "substeps_unseen",

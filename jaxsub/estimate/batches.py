@@ -14,6 +14,12 @@ from .integration_steps import substeps_free, substeps_of
 
 def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     """The recordings as the batch that `vehicle` takes, with as many integration steps a sample as it needs."""
+    runs = side_by_side(vehicle, recordings)
+    return dataclasses.replace(runs, substeps=substeps_free(vehicle, runs))
+
+
+def side_by_side(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
+    """The same, with no more steps than linear damping needs: for a model whose steps are known."""
     layout = vehicle.layout
     check_units(layout, recordings)
     plain = jax.tree.map(np.asarray, vehicle)
@@ -21,7 +27,5 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
     fastest = float(np.max(np.abs(np.linalg.eigvals(rates))))
     longest = max(float(np.diff(r.times).max()) for r in recordings)
     # linear damping is exact at any step; effects that replace it have the same rate and are not
-    substeps = substeps_of(longest * fastest)
     columns = {"held": layout.held, "interpolated": layout.interpolated, "channels": layout.columns}
-    runs = stack_runs(recordings, **columns, angles=layout.angles, substeps=substeps)
-    return dataclasses.replace(runs, substeps=substeps_free(vehicle, runs))
+    return stack_runs(recordings, **columns, angles=layout.angles, substeps=substeps_of(longest * fastest))

@@ -61,7 +61,8 @@ class Ended(eqx.Module):
     @property
     def converged(self) -> bool:
         """Whether the search ended at an optimum."""
-        return bool(self.result == RESULTS.successful)
+        # a comparison of results would be a program; of success there is no message
+        return not RESULTS[self.result]
 
     @property
     def problem(self) -> Problem:

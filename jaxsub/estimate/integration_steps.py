@@ -4,18 +4,20 @@ Linear damping is exact at any step. What effects and the vehicle's products of 
 and from $|\lambda|h \approx 2.8$ on a fourth-order Runge–Kutta step grows where the motion decays. Source: Hairer and
 Wanner (1996), Solving Ordinary Differential Equations II, ch. IV.2.
 
-States of effects may turn so sharply that a step which does not grow is still too long: half as long ones then show by
-how much.
+A step that does not grow may still be too long, of a roll or a hysteresis that turns within a sample: half as long ones
+show by how much.
 """
 
 import dataclasses
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Bool, Float
 
+from ..arrays import Values
 from ..effects import AbstractForce, AbstractMemory, Motion
 from ..likelihood import concentrated_sigma
 from ..recording.runs import Runs
@@ -64,14 +66,14 @@ def substeps_for(vehicle: AbstractVehicle, runs: Runs, motion: Motion, most: flo
 
 
 def substeps_free(vehicle: AbstractVehicle, runs: Runs) -> int:
-    """The same in simulation, and as many as effects with states need for an error below the file's noise.
+    """The same in simulation from the file's numbers, and as many as an error far below the file's noise needs.
 
     A channel without a noise in the file needs none.
     """
     runs = dataclasses.replace(runs, substeps=_followed_free(vehicle, runs))
-    if not _with_states(vehicle):
-        return runs.substeps
-    sigma = jnp.array([output.sigma or np.inf for output in vehicle.layout.outputs])
+    sigma = np.array([output.sigma or np.inf for output in vehicle.layout.outputs])
+    # recordings of about the same length share a program
+    runs = runs.padded()
     return substeps_unseen(vehicle, runs, initial_guess(vehicle, runs)[0], sigma)
 
 
@@ -94,33 +96,32 @@ def _followed_free(vehicle: AbstractVehicle, runs: Runs) -> int:
     return runs.substeps
 
 
-def substeps_unseen(vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Array) -> int:
+def substeps_unseen(vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Values) -> int:
     """Steps in a sample interval of which half as long ones change no channel by much of its noise `sigma` (c,), rms.
 
-    As `runs` are where it has no effect with states, or diverges however fine its steps. Source: Hairer, Nørsett and
-    Wanner (1993), Solving Ordinary Differential Equations I, ch. II.4 (step doubling).
+    As `runs` are where it diverges however fine its steps. Source: Hairer, Nørsett and Wanner (1993), Solving Ordinary
+    Differential Equations I, ch. II.4 (step doubling).
     """
-    if not _with_states(vehicle):
-        return runs.substeps
-    shown = lambda steps: simulate(vehicle, dataclasses.replace(runs, substeps=steps), start)
-    steps, before = runs.substeps, shown(runs.substeps)
+    steps, finite = runs.substeps, True
     while steps < FINEST:
-        after = shown(2 * steps)
-        changed = concentrated_sigma(jnp.where(runs.mask, after - before, 0.0), runs) / sigma
-        if bool(jnp.all(changed <= _UNSEEN)):
+        changed, finite = _halved(vehicle, dataclasses.replace(runs, substeps=steps), start)
+        if np.all(np.asarray(changed) <= _UNSEEN * np.asarray(sigma)):
             return steps
-        steps, before = 2 * steps, after
-    return steps if bool(jnp.all(jnp.isfinite(before))) else runs.substeps
+        steps *= 2
+    return steps if finite else runs.substeps
+
+
+@eqx.filter_jit
+def _halved(vehicle: AbstractVehicle, runs: Runs, start: Array) -> tuple[Float[Array, " c"], Bool[Array, ""]]:
+    """What half as long steps change of each channel, rms, SI, and whether what they show is finite."""
+    finer = simulate(vehicle, dataclasses.replace(runs, substeps=2 * runs.substeps), start)
+    off = jnp.where(runs.mask, finer - simulate(vehicle, runs, start), 0.0)
+    return concentrated_sigma(off, runs), jnp.all(jnp.isfinite(finer))
 
 
 def substeps_of(turned: float, least: int = 1) -> int:
     """Steps in an interval that is `turned` times the fastest rate long."""
     return int(np.clip(np.ceil(turned / _FOLLOWED), least, FINEST))
-
-
-def _with_states(vehicle: AbstractVehicle) -> bool:
-    """Whether any effect has states."""
-    return any(isinstance(effect, AbstractMemory) for effect in vehicle.effects)
 
 
 def _at_once(vehicle: AbstractVehicle) -> list[Any]:
