@@ -152,7 +152,7 @@ def test_names_columns_and_units_of_outputs():
     assert layout.columns[5:] == layout.channels[5:]
     units = [layout.unit(name) for name in ("gyro", "cell", "pot", "gps_latitude")]
     assert units == ["rad/s", "Pa", "V", "rad"]
-    assert [row.unit for row in layout.free if "." in row.name] == ["rad", "rad/s", "rad", "(V)/(rad/s)"]
+    assert [row.unit for row in layout.free if "." in row.name] == ["rad", "rad/s", "rad", "V/(rad/s)"]
     assert layout.positions == ("psi", "x", "y", "z")
 
 

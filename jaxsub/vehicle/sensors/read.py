@@ -44,9 +44,8 @@ class Reading:
     def line(self, table: Table, name: str, units: tuple[str, str], entries: dict[str, Any], section: str) -> None:
         """Add scale and offset of a column, of which `units` are the recorded one and the true one."""
         recorded, true = units
-        same = recorded == true
         for key, entry in entries.items():
-            unit = recorded if key == "offset" else "1" if same else f"({recorded})/({true})" if true else ""
+            unit = recorded if key == "offset" else _ratio(recorded, true)
             self.number(f"{name}.{key}", entry, table.place(key), unit, section)
             if key == "scale" and self.numbers[f"{name}.{key}"][0] == 0.0 and not isinstance(entry, str):
                 raise InputError(table.place(key), "is 0", "give what one of the channel's unit is in the column")
@@ -147,9 +146,16 @@ def _unit(table: Table, channel: str, body: bool) -> str:
     if not true or not same_dimension(unit, true):
         if true and "scale" not in table.data:
             what = f"is {unit!r}, and {channel} is in {true}"
-            raise InputError(table.place("unit"), what, f"add scale = … in ({unit})/({true})")
+            raise InputError(table.place("unit"), what, f"add scale = … in {_ratio(unit, true)}")
         return unit
     return ""
+
+
+def _ratio(recorded: str, true: str) -> str:
+    """The unit of what a column in one unit is per channel unit; nothing where the latter may be any."""
+    if recorded == true:
+        return "1"
+    return f"{recorded if recorded.isalpha() else f'({recorded})'}/({true})" if true else ""
 
 
 def _arm(table: Table) -> tuple[float, float, float]:
