@@ -247,6 +247,26 @@ def test_any_table_is_read_and_written_or_refused_in_one_line(channel, entries):
     assert again.layout.free == vehicle.layout.free
 
 
+@settings(max_examples=100, deadline=None)
+@given(
+    st.sampled_from([("inputs", "rudder"), ("prescribed", "theta")]),
+    st.dictionaries(st.sampled_from(["unit", "scale", "offset", "other"]), ENTRIES, max_size=3),
+)
+def test_any_column_of_an_input_is_read_and_written_or_refused_in_one_line(place, entries):
+    """Claim: the same of the columns of inputs and prescribed motions."""
+    section, name = place
+    data = tomllib.loads(TEXT)
+    data[section][name] = {"column": "c"} | entries
+    try:
+        vehicle = vehicle_from(data, "auv.toml")
+    except InputError as refused:
+        assert str(refused).startswith("auv.toml: ") and "\n" not in str(refused)
+        return
+    again = written(vehicle)
+    assert again.layout.free == vehicle.layout.free
+    assert (again.layout.inputs, again.layout.prescribed) == (vehicle.layout.inputs, vehicle.layout.prescribed)
+
+
 def test_a_number_moves_what_follows_it_and_no_output():
     """Claim: a scale that follows an offset moves with it; the outputs stay, and so does an offset that is held."""
     vehicle = auv().with_values({"gyro.offset": np.asarray(0.5)})
