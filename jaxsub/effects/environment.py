@@ -42,8 +42,8 @@ class Current(AbstractFlow):
 
     @property
     def expression(self) -> str:
-        """The velocity through the water."""
-        return "τ(ν - Rᵀ [V_N, V_E, 0])"
+        """The force to first order, with A the slopes of the forces of the water by velocities."""
+        return "-A Rᵀ [V_N, V_E, 0]"
 
     def water(self, positions: Mapping[str, Signal]) -> tuple[Signal, Signal, Signal]:
         """The current in body axes."""
