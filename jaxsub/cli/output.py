@@ -54,17 +54,22 @@ def require_apart(out: Path, inputs: Sequence[Path]) -> None:
     """Raise `InputError` for a link, an input, or a folder that holds an input or the current folder."""
     if out.is_symlink():
         raise InputError(str(out), "is a link", "give --out the path that it leads to, or another")
-    at = out.resolve()
+    at = _real(out)
     for path in inputs:
         if out.exists() and path.exists() and out.samefile(path):
             raise InputError(str(out), f"is the input {path}", _ANOTHER)
-        if at in (path.resolve(), path.absolute()):
+        if at in (_real(path), path.absolute()):
             raise InputError(str(out), f"is the input {path}", _ANOTHER)
-        if at in (*path.resolve().parents, *path.absolute().parents):
+        if at in (*_real(path).parents, *path.absolute().parents):
             raise InputError(str(out), f"holds the input {path}", _ANOTHER)
     here = Path.cwd()
     if at == here or at in here.parents:
         raise InputError(str(out), "is the current folder or holds it", _ANOTHER)
+
+
+def _real(path: Path) -> Path:
+    """The path without links, as far as they lead; `Path.resolve` raises where they lead in a circle before 3.13."""
+    return Path(os.path.realpath(path))
 
 
 def _require_ours(out: Path) -> None:
@@ -106,7 +111,7 @@ def fresh_folders(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> It
         @contextmanager
         def fresh() -> Iterator[Path]:
             index = next(number)
-            new = folder / f"new-{index}" / out.resolve().name
+            new = folder / f"new-{index}" / _real(out).name
             new.mkdir(parents=True)
             with _told_of(new, out):
                 yield new

@@ -149,6 +149,16 @@ def grow(root, files, links, results):
     return written
 
 
+@pytest.mark.parametrize("make", [result, single])
+def test_links_that_lead_in_a_circle_are_refused(tmp_path, make):
+    """Claim: below such a link nothing can be written, and beside an input below one everything can."""
+    (tmp_path / "a").symlink_to(tmp_path / "a")
+    with pytest.raises(InputError, match="is not a folder"):
+        make(tmp_path / "a" / "out")
+    make(tmp_path / "out", inputs=[tmp_path / "a" / "run.csv"])
+    assert (tmp_path / "out").exists()
+
+
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     files=st.dictionaries(PATHS, st.text("xyz", max_size=3), max_size=5),
