@@ -90,6 +90,7 @@ def _environment() -> jinja2.Environment:
         percent=text.percent,
         ratio=text.ratio,
         p_value=text.p_value,
+        p_equals=text.p_equals,
         symbol=text.symbol,
         unit=text.unit,
         formula=text.formula,

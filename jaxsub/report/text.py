@@ -61,6 +61,12 @@ def p_value(p: float) -> str:
     return f"< {power_of_ten(-300)}" if p < _SMALLEST_P else number(p, 2)
 
 
+def p_equals(p: float) -> str:
+    """What stands in a sentence: `p = 0.031`, or `p < 10⁻³⁰⁰`."""
+    said = p_value(p)
+    return f"p {said}" if said.startswith("<") else f"p = {said}"
+
+
 def percent(share: float) -> str:
     """A probability or share in percent; never 0 or 100 % for what is only close to it."""
     if math.isnan(share):

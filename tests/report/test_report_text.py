@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jaxsub.report.text import formula, measurement, number, p_value, percent, ratio, symbol, unit
+from jaxsub.report.text import formula, measurement, number, p_equals, p_value, percent, ratio, symbol, unit
 
 quick = settings(derandomize=True, deadline=None, max_examples=300)
 sizes = st.builds(
@@ -77,6 +77,10 @@ def test_measurement_cases(value, error, text):
 )
 def test_p_value_never_claims_zero(p, text):
     assert p_value(p) == text
+
+
+def test_a_sentence_has_one_relation_of_p():
+    assert [p_equals(p) for p in (0.031, 0.0)] == ["p = 0.031", "p < 10⁻³⁰⁰"]
 
 
 @quick
