@@ -82,8 +82,8 @@ def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[
     columns = []
     for effect, own in zip(effects, tried, strict=True):
         found = [next(made) for _ in own]
-        slopes = [column / _SMALL for column in found]
-        columns.append(slopes if amplitudes(effect) else [found[0], (found[1] - found[0]) / _NUDGE])
+        slopes = amplitudes(effect)
+        columns.append([c / _SMALL for c in found] if slopes else [found[0], (found[1] - found[0]) / _NUDGE])
     return columns
 
 
@@ -92,6 +92,7 @@ def differences(view: View, effects: Sequence[AbstractEffect]) -> list[np.ndarra
     """What each of `effects` adds with its own parameters: a force (2, R, K-1, n), or to the channels (R, K, c)."""
     vehicle, path = view.vehicle, view.path
     forces = iter(actuator_forces(vehicle, path, [e for e in effects if isinstance(e, AbstractActuator)]))
+    flows = iter(flow_forces(vehicle, path, [e for e in effects if isinstance(e, AbstractFlow)]))
     memories = [effect for effect in effects if isinstance(effect, AbstractMemory)]
     remembered = iter(with_memories(memories, path.start, path.end, path.steps))
 
@@ -99,7 +100,7 @@ def differences(view: View, effects: Sequence[AbstractEffect]) -> list[np.ndarra
         if isinstance(effect, AbstractActuator):
             return next(forces)
         if isinstance(effect, AbstractFlow):
-            return flow_force(vehicle, path, effect)
+            return next(flows)
         if isinstance(effect, AbstractForce):
             ends = next(remembered) if isinstance(effect, AbstractMemory) else (path.start, path.end)
             return np.stack([stacked_force(vehicle, effect, motion) for motion in ends])
@@ -121,15 +122,20 @@ def stacked_force(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motio
     return np.stack([np.broadcast_to(parts.get(e, 0.0), like.shape) for e in vehicle.layout.equations], axis=-1)
 
 
-def flow_force(vehicle: AbstractVehicle, path: Trajectory, effect: AbstractFlow) -> np.ndarray:
-    """What the moving water of an effect changes of the vehicle's force, at both ends of each interval."""
-    plain, added = jax.tree.map(np.asarray, effect), []
-    for motion in (path.start, path.end):
-        before = motion.water or dict.fromkeys(EQUATIONS[:3], 0.0 * motion.rates["surge"])
-        after = {e: before[e] + part for e, part in zip(before, plain.water(motion.positions), strict=True)}
-        still, moved = (_force(vehicle, dataclasses.replace(motion, water=water)) for water in (before, after))
-        added.append(np.asarray(moved) - np.asarray(still))
-    return np.stack(added)
+def flow_forces(vehicle: AbstractVehicle, path: Trajectory, effects: Sequence[AbstractFlow]) -> list[np.ndarray]:
+    """What the moving water of each effect changes of the vehicle's force, at both ends of each interval."""
+    ends = []
+    for motion in (path.start, path.end) if effects else ():
+        water = motion.water or dict.fromkeys(EQUATIONS[:3], 0.0 * motion.rates["surge"])
+        motion = dataclasses.replace(motion, water=water)
+        ends.append((motion, np.asarray(_force(vehicle, motion))))
+
+    def added(effect: AbstractFlow, motion: Motion, force: np.ndarray) -> np.ndarray:
+        parts = jax.tree.map(np.asarray, effect).water(motion.positions)
+        water = {e: motion.water[e] + part for e, part in zip(motion.water, parts, strict=True)}
+        return np.asarray(_force(vehicle, dataclasses.replace(motion, water=water))) - force
+
+    return [np.stack([added(effect, *end) for end in ends]) for effect in effects]
 
 
 def actuator_forces(
