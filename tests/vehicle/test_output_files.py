@@ -231,16 +231,22 @@ KEYS = st.sampled_from(
 CHANNELS = ["r", "u", ["u", "v"], "psi", "pressure", "beam", ["latitude", "longitude"], "ax", "depth", "speed"]
 
 
+def read_or_refused(data):
+    """The vehicle of a file; None where it is refused in one line that begins with the file."""
+    try:
+        return vehicle_from(data, "auv.toml")
+    except InputError as refused:
+        assert str(refused).startswith("auv.toml: ") and "\n" not in str(refused)
+        return None
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.sampled_from(CHANNELS), st.dictionaries(KEYS, ENTRIES, max_size=4))
 def test_any_table_is_read_and_written_or_refused_in_one_line(channel, entries):
     """Claim: no table of an output ends in another error, and what is accepted is read back as it was."""
     data = tomllib.loads(TEXT)
     data["outputs"] = {"one": {"channel": channel} | entries, "z": {}}
-    try:
-        vehicle = vehicle_from(data, "auv.toml")
-    except InputError as refused:
-        assert str(refused).startswith("auv.toml: ") and "\n" not in str(refused)
+    if (vehicle := read_or_refused(data)) is None:
         return
     again = written(vehicle)
     assert again.layout.outputs == vehicle.layout.outputs
@@ -257,10 +263,7 @@ def test_any_column_of_an_input_is_read_and_written_or_refused_in_one_line(place
     section, name = place
     data = tomllib.loads(TEXT)
     data[section][name] = {"column": "c"} | entries
-    try:
-        vehicle = vehicle_from(data, "auv.toml")
-    except InputError as refused:
-        assert str(refused).startswith("auv.toml: ") and "\n" not in str(refused)
+    if (vehicle := read_or_refused(data)) is None:
         return
     again = written(vehicle)
     assert again.layout.free == vehicle.layout.free
