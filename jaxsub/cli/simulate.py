@@ -17,7 +17,7 @@ from ..recording.runs import Runs
 from ..report.text import unit
 from ..results import RESULTS
 from ..simulate import simulate
-from ..vehicle import AbstractVehicle, read_vehicle, vehicle_findings, wrapped_columns
+from ..vehicle import AbstractVehicle, read_vehicle, recorded_columns, vehicle_findings
 from . import session, terminal
 from .output import fresh_file, paths_of
 from .runs import checked_run, load_run
@@ -166,7 +166,7 @@ def answer(vehicle: AbstractVehicle, recording: Recording, shown: Float[np.ndarr
     """The recording's inputs with the model's outputs."""
     layout = vehicle.layout
     table = {name: recording.column(name) for name in (*layout.held, *layout.interpolated)}
-    table |= dict(zip(layout.columns, wrapped_columns(layout.outputs, shown).T, strict=True))
+    table |= recorded_columns(layout.outputs, shown)
     return Recording(out.stem, recording.times, table, str(out))
 
 

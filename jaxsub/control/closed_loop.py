@@ -13,7 +13,7 @@ from ..errors import InputError, nearest
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
 from ..simulate import Sampled, at_rest
-from ..vehicle import AbstractVehicle, wrapped_columns
+from ..vehicle import AbstractVehicle, recorded_columns
 from .autopilot import REFERENCES, Autopilot
 
 _LOST = np.radians(60.0)
@@ -71,7 +71,7 @@ def fly(
     states, signals, outputs = (np.asarray(part) for part in flown)
     source = f"{layout.name}, {name}"
     _require_control(vehicle, source, times, states, signals)
-    measured = dict(zip(layout.columns, wrapped_columns(layout.outputs, outputs + draws).T, strict=True))
+    measured = recorded_columns(layout.outputs, outputs + draws)
     inputs = dict(zip((*layout.held, *layout.interpolated), signals.T, strict=True))
     return Recording(name, times, measured | inputs, source)
 

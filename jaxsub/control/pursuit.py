@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..filter import AbstractFilter, FilterState, Sample
 from ..recording import Recording
 from ..simulate import at_rest
-from ..vehicle import wrapped_columns
+from ..vehicle import recorded_columns
 from .mpc import Mpc, Plan, Solved
 from .observer import Drive, observer
 from .plant import Plant
@@ -128,7 +128,7 @@ def _assembled(truth: Plant, mpc: Mpc, table: np.ndarray, rows: list[tuple], nam
     if not np.isfinite(given).all() or not stacked.finite.all():
         first = times[int(np.argmax(~stacked.finite))]
         raise InputError(layout.name, f"the prediction ceases to be finite at {first:g} s", "ask less of it")
-    columns = dict(zip(layout.columns, wrapped_columns(layout.outputs, np.stack(measured)).T, strict=True))
+    columns = recorded_columns(layout.outputs, np.stack(measured))
     signals = np.tile(np.asarray(truth.constants), (len(rows), 1))
     signals[:, list(truth.driven)] = given
     columns |= dict(zip((*layout.held, *layout.interpolated), signals.T, strict=True))

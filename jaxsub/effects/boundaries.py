@@ -72,7 +72,7 @@ class FreeSurfaceSuction(_Suction):
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[FreeSurfaceSuction]":
         """For a body that heaves, pitches and measures its depth, reaches of half to eight diameters that it felt."""
-        if not _feels(facts) or not {"z", "depth", "pressure"} & set(facts.shown.values()):
+        if not _feels(facts) or not facts.measures_depth:
             return []
         reaches = [r * facts.diameter for r in _REACHES if facts.depth_range[0] < 5.0 * r * facts.diameter]
         return [cls(h=number(h)) for h in reaches]
@@ -134,7 +134,7 @@ class TetherDrag(AbstractForce):
     def candidates(cls, facts: Facts) -> "Sequence[TetherDrag]":
         """One, for a body that measures its depth and is free to translate."""
         moves = tuple(e for e in facts.equations if e in EQUATIONS[:3])
-        deep = facts.kind == "submerged-body" and bool({"z", "depth", "pressure"} & set(facts.shown.values()))
+        deep = facts.kind == "submerged-body" and facts.measures_depth
         return [cls(moves)] if moves and deep else []
 
     @property

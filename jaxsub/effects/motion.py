@@ -161,6 +161,11 @@ class Facts(eqx.Module):
         return {channel: read_quantity(self.quantities.get(channel, ""), channel)[0] for channel in self.channels}
 
     @property
+    def measures_depth(self) -> bool:
+        """Whether any channel shows the depth, in whatever form."""
+        return bool({"z", "depth", "pressure"} & set(self.shown.values()))
+
+    @property
     def largest_commands(self) -> dict[str, float]:
         """The largest size of the command of each actuator that moved."""
         sizes = {name: self.input_range[name][1] for name in self.actuators if name in self.input_range}

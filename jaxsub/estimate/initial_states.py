@@ -58,8 +58,9 @@ def _resting(vehicle: AbstractVehicle) -> Float[np.ndarray, " s"]:
 def state_channels(layout: Layout) -> dict[str, str]:
     """By state the output that measures it, of those states that have one; the state itself before other forms."""
     among = {name: [o for o in layout.outputs if o.state == name] for name in layout.states}
-    plain = lambda output: output.channel != output.name
-    return {name: min(outputs, key=plain).name for name, outputs in among.items() if outputs}
+    # false comes before true
+    other = lambda output: output.channel != output.name
+    return {name: min(outputs, key=other).name for name, outputs in among.items() if outputs}
 
 
 def _as_states(vehicle: AbstractVehicle, runs: Runs) -> Float[np.ndarray, "r k c"]:

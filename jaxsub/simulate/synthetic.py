@@ -10,7 +10,7 @@ from ..effects import VELOCITIES
 from ..errors import InputError
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
-from ..vehicle import AbstractVehicle, wrapped_columns
+from ..vehicle import AbstractVehicle, recorded_columns
 from .continuous import integrate
 from .sampled import measure
 
@@ -60,7 +60,7 @@ def synthetic(
         outputs = shown[index, : len(recording.times)]
         _require_finite(recording, outputs)
         draws = np.random.default_rng([seed, index]).standard_normal(outputs.shape)
-        measured = dict(zip(layout.columns, wrapped_columns(layout.outputs, outputs + sigma * draws).T, strict=True))
+        measured = recorded_columns(layout.outputs, outputs + sigma * draws)
         inputs = {name: recording.column(name) for name in columns}
         made.append(Recording(recording.name, recording.times, measured | inputs, f"{recording.source} (synthetic)"))
     return made

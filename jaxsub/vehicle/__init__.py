@@ -10,7 +10,7 @@ from .initial import InitialFile, initial_file, published_file
 from .mechanism import Mechanism
 from .oddities import vehicle_findings
 from .read import read_vehicle, vehicle_from
-from .sensors import Output, Sensors, quantities_of, wrapped_columns
+from .sensors import Output, Sensors, quantities_of, recorded_columns
 from .submerged_body import SubmergedBody
 from .write import vehicle_text, write_vehicle
 
@@ -30,12 +30,12 @@ __all__ = [
     "quantities_of",
     "read_sdf",
     "read_vehicle",
+    "recorded_columns",
     "require_inertia",
     "sdf_text",
     "vehicle_findings",
     "vehicle_from",
     "vehicle_text",
     "with_coefficients",
-    "wrapped_columns",
     "write_vehicle",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from jaxsub.vehicle import vehicle_from, wrapped_columns
+from jaxsub.vehicle import recorded_columns, vehicle_from
 from jaxsub.vehicle.sensors.earth import radii
 from jaxsub.vehicle.sensors.water import depth_at, pressure
 
@@ -110,7 +110,7 @@ def test_heading_is_written_within_its_turn():
     headings = np.array([[-0.1, -0.1], [3.5, 3.5], [6.5, 6.5]])
     data = {"schema": 1, "name": "box", "kind": "submerged-body", "body": {"mass": 2.0}}
     data["outputs"] = {"a": {"channel": "psi", "wrap": "0-360"}, "b": {"channel": "psi", "wrap": "+-180"}}
-    found = wrapped_columns(vehicle_from(data, "box.toml").layout.outputs, headings)
+    found = np.stack([*recorded_columns(vehicle_from(data, "box.toml").layout.outputs, headings).values()], axis=1)
     np.testing.assert_allclose(found, [[2 * np.pi - 0.1, -0.1], [3.5, 3.5 - 2 * np.pi], [6.5 - 2 * np.pi] * 2])
 
 

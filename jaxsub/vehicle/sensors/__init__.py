@@ -2,7 +2,7 @@
 
 from .output import RAW_UNITS, SPECIFIC_FORCE, Output, channel_unit, quantities_of
 from .read import read_columns, read_outputs
-from .sensors import Sensors, wrapped_columns
+from .sensors import Sensors, recorded_columns
 from .write import column_entry, output_tables
 
 __all__ = [
@@ -16,5 +16,5 @@ __all__ = [
     "quantities_of",
     "read_columns",
     "read_outputs",
-    "wrapped_columns",
+    "recorded_columns",
 ]

@@ -1,6 +1,7 @@
 """`[outputs]` tables in, and the columns of `[inputs]` and `[prescribed]`."""
 
 import dataclasses
+import math
 from typing import Any
 
 from ...effects import CHANNEL_UNITS, INPUT_UNITS
@@ -15,7 +16,7 @@ from .output import FRAMES, RAW_UNITS, STILL, WRAPS, Output, channel_unit
 from .sensors import MOUNTING
 
 _MOST = 200
-_QUARTER = 1.5707963267948966
+_QUARTER = 0.5 * math.pi
 
 
 @dataclasses.dataclass
@@ -41,8 +42,12 @@ class Reading:
             return
         self.numbers[name] = read_number(entry, place, row)
 
-    def line(self, table: Table, name: str, units: tuple[str, str], entries: dict[str, Any], section: str) -> None:
-        """Add scale and offset of a column, of which `units` are the recorded one and the true one."""
+    def line(
+        self, table: Table, name: str, channel: str, units: tuple[str, str], entries: dict[str, Any], section: str
+    ) -> None:
+        """Add scale and offset of a column that shows `channel`; `units` are the recorded one and the true one."""
+        if channel == "psi" and "scale" in entries:
+            raise InputError(table.place("scale"), "is of a heading, whose turns have one size", "delete it")
         recorded, true = units
         for key, entry in entries.items():
             unit = recorded if key == "offset" else _ratio(recorded, true)
@@ -105,9 +110,7 @@ def _read(table: Table, name: str, known: tuple[str, ...], body: bool, found: Re
         )
         true = channel_unit(channel) if body else ""
         entries = {key: entries[i] for key, entries in lines.items()}
-        if channel == "psi" and "scale" in entries:
-            raise InputError(table.place("scale"), "is of a heading, whose turns have one size", "delete it")
-        found.line(table, own, (unit or true, true), entries, "outputs")
+        found.line(table, own, channel, (unit or true, true), entries, "outputs")
         found.outputs.append(output)
 
 
@@ -238,8 +241,6 @@ def read_columns(
             entry = own.required("column")
             lines = {key: own.data[key] for key in ("scale", "offset") if key in own.data}
             unit = units.get(name) or channel_unit(name) or INPUT_UNITS.get(name, "")
-            if name == "psi" and "scale" in lines:
-                raise InputError(own.place("scale"), "is of a heading, whose turns have one size", "delete it")
-            found.line(own, name, (unit, unit), lines, table.section)
+            found.line(own, name, name, (unit, unit), lines, table.section)
         pairs.append((name, read_column(entry, table.place(name), name)))
     return tuple(pairs), units

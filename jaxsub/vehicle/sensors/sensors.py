@@ -122,14 +122,16 @@ class Sensors(eqx.Module):
         return vector @ rotation(*(jnp.zeros(()) if angle is None else angle for angle in angles))
 
 
-def wrapped_columns(outputs: tuple[Output, ...], shown: Float[np.ndarray, "k c"]) -> Float[np.ndarray, "k c"]:
-    """What outputs show, headings within the turn in which their column is written."""
-    shown = np.array(shown)
-    for column, output in enumerate(outputs):
-        if output.wrap:
-            begin = WRAPS[output.wrap]
-            shown[:, column] = begin + np.mod(shown[:, column] - begin, 2.0 * np.pi)
-    return shown
+def recorded_columns(outputs: tuple[Output, ...], shown: Float[np.ndarray, "k c"]) -> dict[str, np.ndarray]:
+    """What outputs show by column of a log, headings within the turn in which their column is written."""
+
+    def written(output: Output, values: np.ndarray) -> np.ndarray:
+        if not output.wrap:
+            return values
+        begin = WRAPS[output.wrap]
+        return begin + np.mod(values - begin, 2.0 * np.pi)
+
+    return {output.column: written(output, np.array(own)) for output, own in zip(outputs, shown.T, strict=True)}
 
 
 def _position(output: Output, channel: str, channels: Mapping[str, Signal], motion: Motion) -> Signal:
