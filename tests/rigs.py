@@ -8,7 +8,7 @@ import numpy as np
 from jaxsub.effects import Facts, candidates, with_numbers
 from jaxsub.recording import Recording, save
 from jaxsub.recording.runs import Runs, stack_runs
-from jaxsub.simulate import prbs, synthetic
+from jaxsub.simulation import prbs, synthetic
 from jaxsub.vehicle import AbstractVehicle, Mechanism, vehicle_from, write_vehicle
 
 # one over what is a usual size, where others are of the order of a hundredth

@@ -11,7 +11,7 @@ import numpy as np
 from jaxsub.cli.demo import inputs
 from jaxsub.estimate import Problem, batch
 from jaxsub.recording import Recording
-from jaxsub.simulate import at_rest, sampled_states, synthetic
+from jaxsub.simulation import at_rest, sampled_states, synthetic
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import nps_auv_ii
 

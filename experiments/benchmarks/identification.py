@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from jaxsub.recording import Recording, save
-from jaxsub.simulate import prbs, synthetic
+from jaxsub.simulation import prbs, synthetic
 from jaxsub.vehicle import vehicle_from, write_vehicle
 
 _SAMPLES, _INTERVAL = 400, 0.1

@@ -9,7 +9,7 @@ from jaxsub.cli.demo import inputs
 from jaxsub.effects.hull import CrossflowDrag
 from jaxsub.parameters import number
 from jaxsub.recording import Recording, save
-from jaxsub.simulate import sampled_states, synthetic
+from jaxsub.simulation import sampled_states, synthetic
 from jaxsub.vehicle import AbstractVehicle, write_vehicle
 from jaxsub.vehicle.catalogue import nps_auv_ii
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jaxsub.recording import Recording
-from jaxsub.simulate import prbs, synthetic
+from jaxsub.simulation import prbs, synthetic
 from jaxsub.vehicle import AbstractVehicle, vehicle_from
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii
 

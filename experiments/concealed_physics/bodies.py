@@ -9,7 +9,7 @@ import math
 import numpy as np
 import tomlkit
 
-from jaxsub.simulate.manoeuvres import doublet, prbs, square, three_two_one_one
+from jaxsub.simulation.manoeuvres import doublet, prbs, square, three_two_one_one
 from jaxsub.vehicle import AbstractVehicle, Mechanism, SubmergedBody, vehicle_from
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii
 from jaxsub.vehicle.write import vehicle_text

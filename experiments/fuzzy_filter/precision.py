@@ -40,7 +40,7 @@ from jaxsub.navigation.position import Course, DeadReckoning
 from jaxsub.navigation.strapdown import Inertial, StrapdownNavigation
 from jaxsub.recording import Recording
 from jaxsub.recording.runs import stack_runs
-from jaxsub.simulate import prbs, synthetic
+from jaxsub.simulation import prbs, synthetic
 from jaxsub.vehicle.catalogue import dsrv
 
 from .realtime import Flight, flight

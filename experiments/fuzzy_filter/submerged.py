@@ -36,8 +36,8 @@ from jaxsub.filter import samples
 from jaxsub.parameters import number
 from jaxsub.recording import Recording
 from jaxsub.recording.runs import Runs, stack_runs
-from jaxsub.simulate import at_rest, prbs, sampled_states, simulate
-from jaxsub.simulate.sampled import measure
+from jaxsub.simulation import at_rest, prbs, sampled_states, simulate
+from jaxsub.simulation.sampled import measure
 from jaxsub.vehicle import SubmergedBody
 from jaxsub.vehicle.catalogue import nps_auv_ii
 

@@ -17,7 +17,7 @@ from jaxsub.cli import session, terminal
 from jaxsub.effects import VOCABULARY, AbstractEffect, amplitudes, candidates, numbers, with_numbers
 from jaxsub.estimate import batch
 from jaxsub.recording import Recording
-from jaxsub.simulate import simulate
+from jaxsub.simulation import simulate
 from jaxsub.vehicle import AbstractVehicle
 
 from .picture import draw

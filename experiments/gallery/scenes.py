@@ -12,7 +12,7 @@ import numpy as np
 from experiments.concealed_physics.bodies import CRUISE_SHAFT, body
 from jaxsub.effects import Facts
 from jaxsub.recording import Recording
-from jaxsub.simulate.manoeuvres import doublet, prbs, square
+from jaxsub.simulation.manoeuvres import doublet, prbs, square
 from jaxsub.vehicle import AbstractVehicle
 
 SHARE = 0.2

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxsub.estimate import Found, Problem, Rate, gauss_newton, scattered
-from jaxsub.identifiability import coloured_covariance
-from jaxsub.simulate import Sampled, at_rest, measure, simulate
+from jaxsub.information import coloured_covariance
+from jaxsub.simulation import Sampled, at_rest, measure, simulate
 
 from . import setup
 from .figures import coverages

@@ -16,11 +16,11 @@ import numpy as np
 
 from jaxsub.control import scenario_two
 from jaxsub.control.limits import AMPLITUDE, RATE
-from jaxsub.identifiability.design import design, keeping
-from jaxsub.identifiability.design_information import Information, information
-from jaxsub.identifiability.design_limits import Limits, manoeuvre, template
+from jaxsub.information.design_information import Information, information
+from jaxsub.information.design_limits import Limits, manoeuvre, template
+from jaxsub.information.manoeuvre_design import design, keeping
 from jaxsub.recording import Recording
-from jaxsub.simulate import Sampled, at_rest, doublet, prbs, three_two_one_one
+from jaxsub.simulation import Sampled, at_rest, doublet, prbs, three_two_one_one
 from jaxsub.vehicle import AbstractVehicle
 
 from .design_figure import draw

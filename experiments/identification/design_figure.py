@@ -10,9 +10,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import SubFigure
 
-from jaxsub.identifiability.design_information import Information
+from jaxsub.information.design_information import Information
 from jaxsub.recording import Recording
-from jaxsub.simulate import sampled_states, synthetic
+from jaxsub.simulation import sampled_states, synthetic
 from jaxsub.vehicle import AbstractVehicle
 
 _PANELS = {

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsub.estimate import Fit, Problem, gauss_newton, scattered
-from jaxsub.identifiability import equivalent_systems, identifiability, identifiable_subset, profile
+from jaxsub.information import equivalent_systems, identifiability, identifiable_subset, profile
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import nps_auv_ii
 

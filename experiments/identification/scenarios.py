@@ -11,7 +11,7 @@ from jaxsub.estimate import METHODS, AbstractMethod, Problem, channel_rms, scatt
 from jaxsub.likelihood import output_errors
 from jaxsub.recording import Recording
 from jaxsub.results import RESULTS
-from jaxsub.simulate import at_rest
+from jaxsub.simulation import at_rest
 
 from . import setup
 from .figures import estimates, histories

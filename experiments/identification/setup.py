@@ -9,7 +9,7 @@ import numpy as np
 from jaxsub.control import scenario_one, scenario_two
 from jaxsub.estimate import Ended, Fit, Found, Problem, batch, evaluate
 from jaxsub.recording import Recording
-from jaxsub.simulate import at_rest
+from jaxsub.simulation import at_rest
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import nps_auv_ii
 

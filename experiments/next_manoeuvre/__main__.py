@@ -17,8 +17,8 @@ from experiments.parts import main
 from jaxsub.discrepancy import diagnose
 from jaxsub.discrepancy.manoeuvre import Manoeuvre, recorded_limits, separating_manoeuvre
 from jaxsub.estimate import batch, search
-from jaxsub.identifiability.design_limits import Bounds, Limits
-from jaxsub.identifiability.design_search import telegraphs
+from jaxsub.information.design_limits import Bounds, Limits
+from jaxsub.information.design_search import telegraphs
 from jaxsub.recording import Recording
 from jaxsub.vehicle import AbstractVehicle
 

@@ -8,7 +8,7 @@ import numpy as np
 from experiments.concealed_physics.bodies import CRUISE_SHAFT, body, commands, start_state
 from jaxsub.effects import VOCABULARY, AbstractEffect, with_numbers
 from jaxsub.recording import Recording
-from jaxsub.simulate import sampled_states, synthetic
+from jaxsub.simulation import sampled_states, synthetic
 from jaxsub.vehicle import AbstractVehicle
 
 INTERVAL = 0.2

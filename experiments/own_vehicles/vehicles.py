@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from experiments.concealed_physics.bodies import INTERVAL, body, commands, start_state
-from jaxsub.simulate.manoeuvres import square
+from jaxsub.simulation.manoeuvres import square
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import bluerov2_heavy, kvlcc2, otter, remus_100_nonlinear
 

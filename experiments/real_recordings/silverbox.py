@@ -12,7 +12,7 @@ import pandas as pd
 
 from jaxsub.estimate import batch, search
 from jaxsub.recording import Recording
-from jaxsub.simulate import simulate
+from jaxsub.simulation import simulate
 from jaxsub.vehicle import AbstractVehicle, read_vehicle
 
 from ..data import data_folder

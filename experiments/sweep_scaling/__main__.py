@@ -23,7 +23,7 @@ import numpy as np
 
 from experiments.parts import main
 from jaxsub.estimate import gauss_newton, method, share_for
-from jaxsub.sweep import open_sweep, sweep
+from jaxsub.sweeps import open_sweep, sweep
 
 from .case import longer, plan
 from .figure import draw

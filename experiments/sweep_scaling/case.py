@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsub.recording import Recording
-from jaxsub.simulate import prbs, sampled_states, synthetic
-from jaxsub.sweep import Plan
+from jaxsub.simulation import prbs, sampled_states, synthetic
+from jaxsub.sweeps import Plan
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii
 

@@ -11,8 +11,8 @@ from ..effects.hydrostatics import TrimOffset
 from ..effects.sensors import SensorBias, SensorScale
 from ..parameters import number
 from ..recording import Recording, save
-from ..simulate import sampled_states, synthetic
-from ..simulate.manoeuvres import prbs
+from ..simulation import sampled_states, synthetic
+from ..simulation.manoeuvres import prbs
 from ..vehicle import AbstractVehicle, read_vehicle, write_vehicle
 from ..vehicle.catalogue import nps_auv_ii
 from . import session, terminal

@@ -11,8 +11,8 @@ from rich.text import Text
 from ..discrepancy import Diagnosis
 from ..discrepancy import diagnose as diagnose_runs
 from ..discrepancy.decisions import decision_rows
-from ..discrepancy.diagnose import Keep
 from ..discrepancy.next_run import next_run, said
+from ..discrepancy.procedure import Keep
 from ..effects import AbstractEffect, from_script, vocabulary
 from ..errors import InputError, OutputError
 from ..estimate import require_free

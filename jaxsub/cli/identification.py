@@ -9,7 +9,7 @@ from typing import Any
 
 from ..estimate import Assessment, ChannelResidual, Fit
 from ..findings import Finding
-from ..identifiability import Coloured, Estimate, Identifiability, estimates
+from ..information import Coloured, Estimate, Identifiability, estimates
 from ..plain import to_json
 from ..report.text import unit
 from ..results import RESULTS

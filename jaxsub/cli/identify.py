@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from ..estimate import METHODS, Fit, Passes, assess, batch, fit, posterior, require_free
-from ..identifiability import coloured_covariance, identifiability
+from ..information import coloured_covariance, identifiability
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal

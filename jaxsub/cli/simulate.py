@@ -16,7 +16,7 @@ from ..recording import Recording, save
 from ..recording.runs import Runs
 from ..report.text import unit
 from ..results import RESULTS
-from ..simulate import simulate
+from ..simulation import simulate
 from ..vehicle import AbstractVehicle, read_vehicle, recorded_columns, vehicle_findings
 from . import session, terminal
 from .output import fresh_file, paths_of

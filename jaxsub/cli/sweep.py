@@ -16,8 +16,8 @@ from ..plain import to_json
 from ..recording import Recording
 from ..report import sweep_pictures
 from ..storage import Manifest, place
-from ..sweep import Plan, Store, answered, check_folder, require_cluster, require_memory, summarised
-from ..sweep import sweep as run_sweep
+from ..sweeps import Plan, Store, answered, check_folder, require_cluster, require_memory, summarised
+from ..sweeps import sweep as run_sweep
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
 from .options import options

@@ -4,16 +4,16 @@ from .autopilot import Autopilot, Memory
 from .bridge_casadi import casadi_jacobians, casadi_plant
 from .bridge_control import control_system, state_space
 from .closed_loop import fly
+from .equilibrium import Trim, require_trim, trim
 from .export import export_plant, export_plant_loader, load_plant
 from .limits import FinLimits
 from .linear import LinearPlant, linearisation_error, linearise, linearise_rates
 from .mpc import Mpc, Plan, Solved
-from .observer import observer
+from .observers import observer
 from .plant import Jacobians, Plant, discretise
 from .pursuit import Pursuit, pursue
 from .scenarios import references, scenario_one, scenario_two
 from .steering import CourseRate, Depth, Roll
-from .trim import Trim, require_trim, trim
 
 __all__ = [
     "Autopilot",

@@ -12,7 +12,7 @@ from ..effects import AbstractSensor
 from ..errors import InputError, nearest
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
-from ..simulate import Sampled, at_rest
+from ..simulation import Sampled, at_rest
 from ..vehicle import AbstractVehicle, recorded_columns
 from .autopilot import REFERENCES, Autopilot
 

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 
 from ..errors import InputError
 from ..plain import to_json
-from ..simulate import at_rest
+from ..simulation import at_rest
 from ..storage import written_whole
 from . import plant_loader
 from .plant import Plant

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from ..effects import VELOCITIES
 from ..errors import InputError
 from ..parameters import number
-from ..simulate import at_rest
+from ..simulation import at_rest
 from ..vehicle import AbstractVehicle
 
 # A fin that is not at a limit still differs from its demand by rounding, which must not stop the integral.

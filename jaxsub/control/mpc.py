@@ -11,12 +11,12 @@ from jaxtyping import Array, Bool, Float, Int
 
 from ..effects.motion import PROPULSION
 from ..errors import InputError, require_known
-from ..identifiability.design_limits import producible
+from ..information.design_limits import producible
+from .equilibrium import require_trim, trim
 from .limits import FinLimits
 from .mpc_problem import Task, Weights
 from .plant import Plant
 from .sequential import Sequential
-from .trim import require_trim, trim
 
 # m and rad: as large as an operator would forgive
 _SCALE = {"z": 0.5, "psi": 0.09}

@@ -13,8 +13,8 @@ from jaxtyping import Array, Float
 from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, AbstractSensor
 from ..errors import InputError, require_known
 from ..filter.model import linearised
-from ..simulate import Sampled, step_table
-from ..simulate.exponential import StepTable
+from ..simulation import Sampled, step_table
+from ..simulation.exponential import StepTable
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import stack
 

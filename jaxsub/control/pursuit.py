@@ -13,10 +13,10 @@ from jaxtyping import Array, Float
 from ..errors import InputError
 from ..filter import AbstractFilter, FilterState, Sample
 from ..recording import Recording
-from ..simulate import at_rest
+from ..simulation import at_rest
 from ..vehicle import recorded_columns
 from .mpc import Mpc, Plan, Solved
-from .observer import Drive, observer
+from .observers import Drive, observer
 from .plant import Plant
 
 

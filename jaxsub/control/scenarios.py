@@ -4,7 +4,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..recording import Recording
-from ..simulate import prbs
+from ..simulation import prbs
 from ..vehicle import AbstractVehicle
 from .autopilot import Autopilot
 from .closed_loop import fly

@@ -26,7 +26,7 @@ from ..effects import (
     with_numbers,
 )
 from ..likelihood import Columns
-from ..simulate import Trajectory
+from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle
 from .view import View
 

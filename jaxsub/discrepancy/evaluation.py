@@ -11,7 +11,7 @@ from ..estimate import channel_rms, initial_guess, search, side_by_side
 from ..likelihood import follow, residual_outputs
 from ..recording import Recording
 from ..recording.runs import Runs
-from ..simulate import simulate
+from ..simulation import simulate
 from ..vehicle import AbstractVehicle
 from .acceptance import Model
 from .cross_validation import gain

@@ -17,11 +17,11 @@ from jaxtyping import Array, Float
 from ..effects import CHANNEL_UNITS
 from ..errors import InputError
 from ..estimate import Problem, batch
-from ..identifiability.design_limits import Bounds, Limits, Range
-from ..identifiability.design_search import descend, telegraphs
+from ..information.design_limits import Bounds, Limits, Range
+from ..information.design_search import descend, telegraphs
 from ..recording import Recording
 from ..recording.runs import Runs
-from ..simulate import sampled_states
+from ..simulation import sampled_states
 from ..vehicle import AbstractVehicle
 from .separation import Rivals, loss
 

@@ -9,7 +9,7 @@ from scipy import special
 
 from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, numbers, with_numbers
 from ..estimate import Ended, Fit, by_cost, evaluate, race, search
-from ..identifiability import coloured_covariance
+from ..information import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .settings import NEGLIGIBLE, SIGNIFICANCE
 from .view import View

@@ -35,7 +35,7 @@ from ..filter import (
 )
 from ..recording import Recording
 from ..recording.runs import Runs
-from ..simulate import simulate
+from ..simulation import simulate
 from ..vehicle import AbstractVehicle
 from .settings import LEVEL, NOISE_FLOOR, NOISE_RANGE, NOISE_WINDOW, PRIOR_WIDTH
 

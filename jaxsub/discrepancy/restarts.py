@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from ..likelihood import Followed
 from ..recording.runs import Runs
-from ..simulate import simulate
+from ..simulation import simulate
 from ..vehicle import AbstractVehicle
 
 

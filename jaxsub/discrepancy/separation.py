@@ -21,9 +21,9 @@ from jax.scipy.linalg import cho_factor, cho_solve
 from jaxtyping import Array, Float
 
 from ..estimate import Problem
-from ..identifiability.design_limits import Bounds
+from ..information.design_limits import Bounds
 from ..recording.runs import Runs
-from ..simulate import Sampled
+from ..simulation import Sampled
 from ..vehicle import AbstractVehicle
 
 # weight of the squared excess over a channel's limit, and the part of the limit from which it counts

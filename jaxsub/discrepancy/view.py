@@ -24,7 +24,7 @@ from ..likelihood import (
     smoothed,
 )
 from ..recording.runs import Runs
-from ..simulate import Trajectory
+from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle, quantities_of
 from .innovation_search import InnovationSearch, Iterate, distinct, with_wide_priors
 from .settings import BLOCKS, LARGE_ERROR

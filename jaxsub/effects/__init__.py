@@ -26,7 +26,7 @@ from .base import (
     with_numbers,
 )
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
-from .derivative import INPUT_SYMBOLS, INPUT_UNITS, Derivative, Power, alike, derivative
+from .derivatives import INPUT_SYMBOLS, INPUT_UNITS, Derivative, Power, alike, derivative
 from .environment import Current, WaveForcing, stream, wave_band
 from .events import MassShift, ThrustLoss
 from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss, coriolis
@@ -51,11 +51,11 @@ from .motion import (
     velocities,
 )
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
+from .registry import VOCABULARY, candidates, from_script, looked_at, named, vocabulary
 from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
 from .sensors import SensorBias, SensorDrift, SensorScale
 from .smooth import KNOTS, SmoothForce, variables
-from .vocabulary import VOCABULARY, candidates, from_script, looked_at, named, vocabulary
 
 __all__ = [
     "CHANNEL_UNITS",

@@ -13,7 +13,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from ..errors import InputError
 from ..parameters import Parameter, number
-from .derivative import Derivative
+from .derivatives import Derivative
 from .motion import EQUATIONS, Facts, Motion, Signal
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..arrays import Values, namespace
 from .base import AbstractDerivative, AbstractForce, amplitude
-from .derivative import Derivative
+from .derivatives import Derivative
 from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
 
 WATER_DENSITY = 1025.0

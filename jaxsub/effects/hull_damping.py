@@ -7,7 +7,7 @@ import equinox as eqx
 from jaxtyping import Array
 
 from .base import AbstractDerivative, amplitude
-from .derivative import Derivative, Power
+from .derivatives import Derivative, Power
 from .motion import FORCES, VELOCITIES, Facts
 
 

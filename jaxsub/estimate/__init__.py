@@ -4,15 +4,15 @@ from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_resid
 from .batches import batch, side_by_side
 from .combined import Chain, Global
 from .disturbance import estimate_disturbance
-from .ends import Ends, ends
 from .filtered import Filtered
-from .fit import Ended, Fit, channel_rms, evaluate, fit, information_matrix, race, search
+from .fitting import Ended, Fit, channel_rms, evaluate, fit, information_matrix, race, search
 from .initial_states import initial_guess, rest, state_channels
 from .integration_steps import substeps_for, substeps_unseen
 from .method import AbstractMethod, Found, Iterative, Passes, by_cost, share_for, shares_at_once
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
-from .posterior import posterior
+from .posterior_draws import posterior
 from .problem import Expansion, Problem, require_free
+from .search_ends import Ends, ends
 from .starts import MARGIN, Basin, Rate, basins, scattered, scattered_by_number, success
 
 __all__ = [

@@ -18,7 +18,7 @@ from ..findings import Finding
 from ..likelihood import output_errors
 from ..likelihood.whiteness import portmanteau_by_channel, predicted_share
 from ..plain import plain
-from .fit import Ended, Fit
+from .fitting import Ended, Fit
 
 # probability of a false alarm of each test
 LEVEL = 0.01

@@ -21,7 +21,7 @@ from ..arrays import Values
 from ..effects import AbstractForce, AbstractMemory, Motion
 from ..likelihood import concentrated_sigma
 from ..recording.runs import Runs
-from ..simulate import Trajectory, sampled_states, simulate
+from ..simulation import Trajectory, sampled_states, simulate
 from ..vehicle import AbstractVehicle
 from .initial_states import initial_guess
 

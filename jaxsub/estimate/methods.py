@@ -11,9 +11,9 @@ from .combined import Chain
 from .damped import Damped
 from .filtered import Filtered
 from .method import Iterative
-from .nelder_mead import NelderMead
-from .newton import NewtonEq10
+from .newton_raphson import NewtonEq10
 from .problem import Problem
+from .simplex import NelderMead
 
 
 @functools.cache

@@ -20,7 +20,7 @@ from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .curvature import Arrow
 from .initial_states import initial_guess
-from .newton import second_order
+from .newton_raphson import second_order
 
 # how far from the origin two points show which numbers the parameters move
 _NEAR = 0.1

@@ -10,7 +10,7 @@ from ..effects import AbstractActuator, AbstractEffect, AbstractSensor
 from ..errors import InputError
 from ..parameters import Transform
 from ..recording.runs import Runs
-from ..simulate import Sampled, step_table
+from ..simulation import Sampled, step_table
 from ..vehicle import AbstractVehicle
 from .model import AbstractProcess, Sample
 

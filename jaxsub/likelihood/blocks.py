@@ -14,7 +14,7 @@ from jaxtyping import Array, Float, Int
 
 from ..effects import AbstractActuator, AbstractInstrument
 from ..recording.runs import Runs
-from ..simulate import measure, sampled_states
+from ..simulation import measure, sampled_states
 from ..vehicle import AbstractVehicle
 from .output_error import first_turns, wrapped_errors
 from .sensitivity import Checkpoint, Jacobians, Linearised, along, with_jacobians

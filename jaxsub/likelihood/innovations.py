@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 
 from ..effects import AbstractSensor
 from ..recording.runs import Runs
-from ..simulate import Sampled
+from ..simulation import Sampled
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import wrapped
 from .disturbance import Columns, Disturbance, System, augmented, padded_width, total_products

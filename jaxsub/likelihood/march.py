@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 
 from ..errors import InputError
 from ..recording.runs import Runs
-from ..simulate import Sampled
+from ..simulation import Sampled
 from ..vehicle import AbstractVehicle
 
 _INSTEAD = "leave the compiled march out"

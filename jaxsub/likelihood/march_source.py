@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array
 
 from ..recording.runs import Runs
-from ..simulate import Sampled
+from ..simulation import Sampled
 from ..symbolic import casadi_function
 from ..symbolic.lanes import HEADER, lanes_c
 

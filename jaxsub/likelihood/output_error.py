@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..recording.runs import Runs
-from ..simulate import simulate
+from ..simulation import simulate
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import wrapped
 

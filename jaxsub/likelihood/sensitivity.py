@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..recording.runs import Runs
-from ..simulate import Sampled, sampled_states
+from ..simulation import Sampled, sampled_states
 from ..vehicle import AbstractVehicle
 from .output_error import first_turns, wrapped_errors
 

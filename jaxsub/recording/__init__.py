@@ -1,10 +1,10 @@
 """Recordings: one run's samples, the files they are read from and written to, and their division in time."""
 
+from jaxsub.recording.division import hold_out, split
 from jaxsub.recording.files import contents, load, save
 from jaxsub.recording.frames import from_pandas, from_xarray, to_pandas, to_xarray
 from jaxsub.recording.logs import Selection, load_log, read_selection
 from jaxsub.recording.recording import Recording
-from jaxsub.recording.split import hold_out, split
 
 __all__ = [
     "Recording",

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from ..sweep import succeeded
+from ..sweeps import succeeded
 from .drawing import BASELINE, GREY, IMPROVED, PALE, Picture, drawable, new_figure, plain_ticks, png, style
 from .text import file_stem, percent, power_of_ten
 

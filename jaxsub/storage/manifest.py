@@ -17,7 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from .scratch import is_dead, locked, scratch_folders
+from .temporary import is_dead, locked, scratch_folders
 
 MANIFEST = ".jaxsub.jsonl"
 _SCHEMA = 1

@@ -1,8 +1,8 @@
 """Vehicles: one model that simulation, likelihood, filters, diagnosis and controllers share."""
 
 from .absorb import added_effects, with_coefficients
+from .assembly import build
 from .base import AbstractVehicle, Layout
-from .build import build
 from .checks import require_inertia
 from .dimensions import check_units
 from .gazebo import read_sdf, sdf_text

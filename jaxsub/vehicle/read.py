@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..parameters import Parameter
 from ..units import same_dimension
 from .actuators import read_actuators
-from .build import BODY_KEYS, VECTORS, build
+from .assembly import BODY_KEYS, VECTORS, build
 from .checks import check_count
 from .coefficient_units import coefficient_unit
 from .mechanism import Mechanism

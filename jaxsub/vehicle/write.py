@@ -11,8 +11,8 @@ from ..errors import OutputError
 from ..parameters import Parameter
 from ..storage import written_whole
 from .actuators import Actuators, actuator_tables
+from .assembly import BODY_KEYS, VECTORS
 from .base import AbstractVehicle
-from .build import BODY_KEYS, VECTORS
 from .sensors import column_entry, output_tables
 from .submerged_body import CORIOLIS, SubmergedBody
 

@@ -19,11 +19,11 @@ from . import mathematics
 _BESIDE = (
     "jaxsub.discrepancy.next_run",
     "jaxsub.filter.ekf",
-    "jaxsub.identifiability.design_limits",
+    "jaxsub.information.design_limits",
     "jaxsub.recording.logs",
     "jaxsub.recording.runs",
     "jaxsub.report.drawing",
-    "jaxsub.simulate.manoeuvres",
+    "jaxsub.simulation.manoeuvres",
     "jaxsub.vehicle.catalogue",
 )
 _NAME = re.compile(r"`(jaxsub(?:\.\w+)+)(?:\(\))?`")

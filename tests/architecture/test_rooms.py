@@ -14,8 +14,8 @@ FILES = sorted(HOUSE.rglob("*.py"))
 # design.md, with effects before vehicle, which has them built in
 ORDER = (
     "errors", "findings", "plain", "storage", "unit_names", "units", "arrays", "parameters", "results", "symbolic",
-    "recording", "effects", "sensors", "vehicle", "simulate", "filter", "navigation", "likelihood", "estimate",
-    "identifiability", "checks", "discrepancy", "control", "sweep", "report", "cli", "__main__",
+    "recording", "effects", "sensors", "vehicle", "simulation", "filter", "navigation", "likelihood", "estimate",
+    "information", "checks", "discrepancy", "control", "sweeps", "report", "cli", "__main__",
 )  # fmt: skip
 
 
@@ -58,6 +58,35 @@ def test_the_reader_of_imports_sees_every_form():
     source = ast.parse(absolute + relative + "from .a import b")
     found = list(imported(HOUSE / "effects" / "hull.py", source))
     assert found == ["cli", "report", "vehicle", "units", "effects"]
+
+
+def bound(tree):
+    """The names that the top of a module imports, defines or assigns, but for modules of its own package."""
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield from (alias.asname or alias.name for alias in node.names)
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Assign):
+            yield from (target.id for target in node.targets if isinstance(target, ast.Name))
+
+
+PACKAGES = [path for path in FILES if path.name == "__init__.py"]
+
+
+@pytest.mark.parametrize("path", PACKAGES, ids=lambda path: str(path.parent.relative_to(HOUSE)))
+def test_package_hides_none_of_its_modules(path):
+    """Claim: no name of a package is that of one of its modules, which could then not be reached as an attribute."""
+    modules = {file.stem for file in path.parent.glob("*.py")} | {
+        file.parent.name for file in path.parent.glob("*/*.py")
+    }
+    names = set(bound(ast.parse(path.read_text(encoding="utf-8"))))
+    assert names.isdisjoint(modules)
+
+
+def test_the_reader_of_names_sees_every_form():
+    source = "from .fit import fit, Fit as F\nfrom . import plain\ndef f(): ...\nclass C: ...\nx = 1\nimport os\n"
+    assert list(bound(ast.parse(source))) == ["fit", "F", "f", "C", "x"]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOUSE)))

@@ -7,7 +7,7 @@ import numpy as np
 from rigs import body, coupled, driven, oscillator
 
 from jaxsub.recording import Recording
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii, remus_100
 

@@ -15,7 +15,7 @@ from jaxsub.effects.actuators import ActuatorLag
 from jaxsub.estimate import METHODS
 from jaxsub.parameters import number
 from jaxsub.recording import save
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle import read_vehicle, write_vehicle
 
 TRUTH = {"D_x": 0.6, "K_x": 4.0, "B_x_drive": 2.0}

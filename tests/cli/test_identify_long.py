@@ -10,7 +10,7 @@ import pytest
 from rigs import driven, oscillator
 
 from jaxsub.recording import save
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle import AbstractVehicle, write_vehicle
 from jaxsub.vehicle.catalogue import nps_auv_ii
 

@@ -13,7 +13,7 @@ import pytest
 from rigs import driven, oscillator
 
 from jaxsub.recording import save
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle import write_vehicle
 
 ROOT = Path(__file__).parents[2]

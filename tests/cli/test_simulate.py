@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from jaxsub.estimate import batch, channel_rms, fit, search
 from jaxsub.likelihood import output_errors
 from jaxsub.recording import load, save
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle import read_vehicle, write_vehicle
 
 BEGAN = {"x": 0.3, "x_rate": -0.4}

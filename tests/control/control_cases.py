@@ -16,7 +16,7 @@ from jaxsub.effects import (
 from jaxsub.effects.actuator_curves import ActuatorSaturation
 from jaxsub.effects.actuators import ActuatorBacklash, ActuatorDelay, ActuatorLag, ActuatorRateLimit
 from jaxsub.parameters import number
-from jaxsub.simulate import at_rest
+from jaxsub.simulation import at_rest
 from jaxsub.vehicle import vehicle_from
 from jaxsub.vehicle.catalogue import nps_auv_ii
 

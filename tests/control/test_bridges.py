@@ -23,7 +23,7 @@ from jaxsub.control import (
     state_space,
 )
 from jaxsub.errors import InputError
-from jaxsub.simulate import at_rest
+from jaxsub.simulation import at_rest
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii, remus_100
 
 DT = 0.2

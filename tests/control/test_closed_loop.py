@@ -9,7 +9,7 @@ from jaxsub.effects.sensors import SensorBias, SensorDrift
 from jaxsub.errors import InputError
 from jaxsub.parameters import number
 from jaxsub.recording import Recording, load, save
-from jaxsub.simulate import at_rest, prbs, sampled_states, synthetic
+from jaxsub.simulation import at_rest, prbs, sampled_states, synthetic
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii, remus_100
 
 WANTED = {"depth": np.where(TIMES < 40.0, 4.0, 1.0), "course_rate": np.where(TIMES < 20.0, 0.08, -0.05)}

@@ -9,12 +9,12 @@ import pytest
 
 from jaxsub.control import FinLimits, Mpc, casadi_plant, discretise, observer, pursue
 from jaxsub.control.mpc_problem import spread
-from jaxsub.control.observer import Drive
+from jaxsub.control.observers import Drive
 from jaxsub.effects import ActuatorLag
 from jaxsub.errors import InputError
 from jaxsub.filter import Sample
 from jaxsub.parameters import number
-from jaxsub.simulate import at_rest
+from jaxsub.simulation import at_rest
 from jaxsub.vehicle.catalogue import nps_auv_ii
 
 DT, LIMITS, WITHIN = 0.2, FinLimits.of(0.3, 0.25), {"theta": (-0.12, 0.12), "z": (-1.0, 2.5)}

@@ -14,7 +14,7 @@ from jaxsub.effects.actuators import ActuatorDelay
 from jaxsub.errors import InputError
 from jaxsub.parameters import number
 from jaxsub.recording import Recording
-from jaxsub.simulate import at_rest, sampled_states, synthetic
+from jaxsub.simulation import at_rest, sampled_states, synthetic
 from jaxsub.vehicle import read_vehicle, vehicle_from, write_vehicle
 from jaxsub.vehicle.catalogue import nps_auv_ii, remus_100
 

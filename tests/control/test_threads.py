@@ -20,7 +20,7 @@ from jaxsub.control import (
     require_trim,
     trim,
 )
-from jaxsub.control.observer import Drive
+from jaxsub.control.observers import Drive
 from jaxsub.filter import Sample, on_line
 from jaxsub.symbolic import compiled
 from jaxsub.vehicle.catalogue import nps_auv_ii

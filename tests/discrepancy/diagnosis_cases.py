@@ -8,9 +8,9 @@ from scipy.signal import lfilter
 
 from jaxsub.effects import AbstractEffect
 from jaxsub.recording import Recording
-from jaxsub.simulate.manoeuvres import prbs
-from jaxsub.simulate.sampled import Sampled
-from jaxsub.simulate.synthetic import integrate, synthetic
+from jaxsub.simulation.manoeuvres import prbs
+from jaxsub.simulation.sampled import Sampled
+from jaxsub.simulation.synthesis import integrate, synthetic
 from jaxsub.vehicle import SubmergedBody
 from jaxsub.vehicle.catalogue import dsrv
 

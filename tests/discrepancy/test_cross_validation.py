@@ -14,7 +14,7 @@ from jaxsub.discrepancy.verdict import NOTHING, helped
 from jaxsub.discrepancy.view import look
 from jaxsub.estimate import batch, fit
 from jaxsub.likelihood import BlockLinearised, whitened
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 
 
 @cache

@@ -14,7 +14,7 @@ from jaxsub.discrepancy.evidence import evidence_of
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.estimate import batch, fit
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 
 
 @pytest.fixture(scope="module")

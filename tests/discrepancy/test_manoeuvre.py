@@ -13,10 +13,10 @@ from jaxsub.discrepancy.separation import Rivals, loss
 from jaxsub.effects import VOCABULARY, with_numbers
 from jaxsub.errors import InputError
 from jaxsub.estimate import batch, search
-from jaxsub.identifiability.design_limits import Bounds, Limits
-from jaxsub.identifiability.design_search import descend
+from jaxsub.information.design_limits import Bounds, Limits
+from jaxsub.information.design_search import descend
 from jaxsub.recording import Recording, load, save
-from jaxsub.simulate import prbs, sampled_states, simulate, synthetic
+from jaxsub.simulation import prbs, sampled_states, simulate, synthetic
 from jaxsub.vehicle import write_vehicle
 from jaxsub.vehicle.catalogue import dsrv
 

@@ -8,7 +8,7 @@ from rigs import driven, oscillator
 
 from jaxsub.discrepancy import diagnose
 from jaxsub.effects import AsymmetricDamping, CoulombFriction, CubicStiffness, QuadraticDamping
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 
 KINDS = (AsymmetricDamping, CoulombFriction, CubicStiffness, QuadraticDamping)
 

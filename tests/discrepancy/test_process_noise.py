@@ -13,8 +13,8 @@ from jaxsub.discrepancy.view import look
 from jaxsub.effects import ActuatorLag
 from jaxsub.estimate import batch, fit
 from jaxsub.recording import Recording
-from jaxsub.simulate import Sampled, at_rest, prbs
-from jaxsub.simulate.sampled import measure
+from jaxsub.simulation import Sampled, at_rest, prbs
+from jaxsub.simulation.sampled import measure
 from jaxsub.vehicle.catalogue import dsrv
 
 EVENT = (30.0, 50.0)

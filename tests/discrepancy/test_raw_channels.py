@@ -16,7 +16,7 @@ from jaxsub.effects import (
     SensorScale,
 )
 from jaxsub.recording import Recording
-from jaxsub.simulate import prbs, synthetic
+from jaxsub.simulation import prbs, synthetic
 from jaxsub.vehicle import vehicle_from
 
 pytestmark = pytest.mark.long

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from jaxsub.discrepancy.validation import beyond_noise, correlation, remainders
 from jaxsub.recording import Recording
-from jaxsub.simulate.manoeuvres import prbs
+from jaxsub.simulation.manoeuvres import prbs
 from jaxsub.vehicle import Output
 
 DT, RUNS = 0.2, 2

@@ -5,7 +5,7 @@ import pytest
 
 from jaxsub.discrepancy import diagnose
 from jaxsub.recording import Recording
-from jaxsub.simulate import prbs, synthetic
+from jaxsub.simulation import prbs, synthetic
 from jaxsub.vehicle import vehicle_from
 
 pytestmark = pytest.mark.long

@@ -10,7 +10,7 @@ from samples import BODY, RIG, motion
 from scipy.integrate import solve_ivp
 
 from jaxsub.effects import FluidMemory, Hysteresis, admissible, with_memories
-from jaxsub.simulate import Sampled, at_rest
+from jaxsub.simulation import Sampled, at_rest
 
 RATE = lambda t: 0.4 * np.sin(1.3 * t) + 0.2 * np.cos(3.1 * t)
 TIMES = np.concatenate([[0.0], np.cumsum(np.random.default_rng(2).uniform(0.01, 0.03, 300))])

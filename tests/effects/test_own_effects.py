@@ -9,7 +9,7 @@ from rigs import driven, oscillator, stacked
 
 from jaxsub.effects import VOCABULARY, from_script, vocabulary
 from jaxsub.errors import InputError
-from jaxsub.simulate import at_rest, simulate
+from jaxsub.simulation import at_rest, simulate
 from jaxsub.vehicle import read_vehicle, write_vehicle
 
 SCRIPT = '''

@@ -9,9 +9,9 @@ from rigs import driven, stacked
 
 from jaxsub.estimate import METHODS, Chain, Global, Problem, basins, fit, gauss_newton, mekf, scattered, success
 from jaxsub.estimate.method import Iterative
-from jaxsub.estimate.nelder_mead import NelderMead
+from jaxsub.estimate.simplex import NelderMead
 from jaxsub.results import RESULTS
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle.catalogue import dsrv
 
 # half a millionth of the cost away is a thousandth of a standard error

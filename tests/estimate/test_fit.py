@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from jaxsub.effects import KNOTS, SmoothForce
 from jaxsub.estimate import Problem, fit, gauss_newton, initial_guess, search
 from jaxsub.results import RESULTS
-from jaxsub.simulate import simulate, synthetic
+from jaxsub.simulation import simulate, synthetic
 from jaxsub.vehicle.catalogue import dsrv, remus_100
 
 NAMES = ("D_x", "K_x", "B_x_drive")

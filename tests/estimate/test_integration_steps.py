@@ -14,8 +14,8 @@ from jaxsub.effects import CubicStiffness, QuadraticDamping
 from jaxsub.effects.memory import Hysteresis
 from jaxsub.estimate import batch, evaluate, fit, gauss_newton, initial_guess
 from jaxsub.estimate.integration_steps import FINEST, fastest, substeps_for, substeps_unseen
-from jaxsub.simulate import simulate, synthetic
-from jaxsub.simulate.synthetic import integrate
+from jaxsub.simulation import simulate, synthetic
+from jaxsub.simulation.synthesis import integrate
 from jaxsub.vehicle import vehicle_from, with_coefficients
 
 

@@ -14,7 +14,7 @@ from jaxsub.effects import AbstractActuator, parameter_table
 from jaxsub.errors import InputError
 from jaxsub.estimate import Problem, gauss_newton, scattered
 from jaxsub.estimate.problem import Expansion
-from jaxsub.simulate import simulate, synthetic
+from jaxsub.simulation import simulate, synthetic
 from jaxsub.vehicle import vehicle_from
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")

@@ -7,7 +7,7 @@ import optimistix as optx
 import pytest
 from rigs import oscillator, recorded
 
-from jaxsub.estimate.nelder_mead import NelderMead
+from jaxsub.estimate.simplex import NelderMead
 from jaxsub.likelihood import errors
 
 

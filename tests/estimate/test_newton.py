@@ -9,7 +9,7 @@ from rigs import oscillator, recorded
 from scipy.optimize import minimize
 
 from jaxsub.estimate.damped import Damped
-from jaxsub.estimate.newton import NewtonEq10, second_order
+from jaxsub.estimate.newton_raphson import NewtonEq10, second_order
 from jaxsub.estimate.problem import Expansion
 from jaxsub.likelihood import errors
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from jaxsub.errors import InputError
 from jaxsub.estimate import fit, posterior
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 
 pytest.importorskip("numpyro")
 with warnings.catch_warnings():

@@ -11,7 +11,7 @@ from rigs import driven, oscillator, stacked
 from jaxsub.errors import InputError
 from jaxsub.estimate import Problem, share_for, shares_at_once
 from jaxsub.estimate.method import bytes_of_a_lane, lanes_for
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 
 
 def test_a_pool_on_an_accelerator_is_as_wide_as_half_its_memory_and_has_it_to_itself(monkeypatch):

@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import chi2
 
 from jaxsub.estimate import batch, fit, initial_guess
-from jaxsub.identifiability import identifiability
+from jaxsub.information import identifiability
 from jaxsub.recording import Recording
-from jaxsub.simulate import prbs, synthetic
+from jaxsub.simulation import prbs, synthetic
 from jaxsub.vehicle import vehicle_from
 
 RIG = """

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from jaxsub.estimate import fit
 from jaxsub.estimate.starts import _connected
 from jaxsub.results import RESULTS
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 
 FITS = 120
 

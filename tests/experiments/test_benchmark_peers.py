@@ -11,7 +11,7 @@ casadi_model = pytest.importorskip("experiments.benchmarks.peers.casadi_model", 
 from experiments.benchmarks.case import problem_and_case  # noqa: E402
 from experiments.benchmarks.peers import casadi_fit, scipy_fit  # noqa: E402
 from experiments.benchmarks.peers.damped import minimise  # noqa: E402
-from jaxsub.simulate import simulate  # noqa: E402
+from jaxsub.simulation import simulate  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -45,7 +45,7 @@ main()
 SWEEP = f"""{ENDLESS}
 import itertools
 from jaxsub.cli import main
-from jaxsub.sweep import execute
+from jaxsub.sweeps import execute
 whole = execute.on_this_machine
 def first(plan, chunks):
     yield next(iter(whole(plan, chunks[:1])))

@@ -13,7 +13,7 @@ from rigs import driven, oscillator
 
 from jaxsub.effects import QuadraticDamping
 from jaxsub.recording import save
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle import read_vehicle, write_vehicle
 
 # signals come as soon as the second look at what is left begins

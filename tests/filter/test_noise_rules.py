@@ -30,7 +30,7 @@ from jaxsub.filter import (
     over_runs,
     samples,
 )
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 
 FORMS = {"qr": SquareRoot(), "svd": SquareRoot("svd"), "plain": Covariance()}
 RULES = ["constant", "random", "fuzzy", "sage_husa", "innovation"]

@@ -16,7 +16,7 @@ from jaxsub.filter.model import linearised
 from jaxsub.filter.passes import identify, over_runs
 from jaxsub.filter.vehicle import VehicleProcess, samples
 from jaxsub.recording import Recording
-from jaxsub.simulate import Sampled, at_rest, synthetic
+from jaxsub.simulation import Sampled, at_rest, synthetic
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii
 
 

@@ -10,7 +10,7 @@ from rigs import driven, oscillator
 from jaxsub.checks import check
 from jaxsub.findings import require_none
 from jaxsub.recording import load, save
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle.catalogue import nps_auv_ii
 
 VEHICLES = {"rig": oscillator, "auv": nps_auv_ii}

@@ -9,10 +9,10 @@ import pytest
 from rigs import body, oscillator, recorded
 
 from jaxsub.estimate import fit
-from jaxsub.identifiability import coloured_covariance, identifiability
+from jaxsub.information import coloured_covariance, identifiability
 from jaxsub.likelihood import BlockLinearised, blocks, linearise, output_errors
 from jaxsub.likelihood.output_error import residual_outputs
-from jaxsub.simulate import simulate
+from jaxsub.simulation import simulate
 
 
 @pytest.fixture

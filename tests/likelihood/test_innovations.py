@@ -16,7 +16,7 @@ from jaxsub.effects.hull_damping import QuadraticDamping
 from jaxsub.effects.sensor_response import SensorDelay
 from jaxsub.likelihood import Columns, Disturbance, follow, smoothed, whitened
 from jaxsub.parameters import number
-from jaxsub.simulate import Sampled
+from jaxsub.simulation import Sampled
 
 SIGMA = jnp.array([0.01, 0.02])
 SPREAD = jnp.array([0.5, 1.0])

@@ -12,7 +12,7 @@ from scipy.stats import norm
 
 from jaxsub.likelihood import concentrated_sigma, errors, negative_log_likelihood
 from jaxsub.recording import Recording
-from jaxsub.simulate import at_rest, simulate
+from jaxsub.simulation import at_rest, simulate
 from jaxsub.vehicle.catalogue import nps_auv_ii
 
 residuals, nll = eqx.filter_jit(errors), eqx.filter_jit(negative_log_likelihood)

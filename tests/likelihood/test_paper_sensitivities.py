@@ -11,7 +11,7 @@ import pytest
 from rigs import driven, stacked
 from scipy.linalg import expm
 
-from jaxsub.simulate import simulate
+from jaxsub.simulation import simulate
 from jaxsub.vehicle.catalogue import dsrv
 
 # damping, control and added mass

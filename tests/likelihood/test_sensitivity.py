@@ -10,7 +10,7 @@ from rigs import driven, stacked
 from jaxsub.effects import ActuatorLag, HullAsymmetry, QuadraticDamping, SensorScale
 from jaxsub.likelihood import errors, force_columns, linearise
 from jaxsub.recording import Recording
-from jaxsub.simulate import simulate, synthetic
+from jaxsub.simulation import simulate, synthetic
 from jaxsub.vehicle.catalogue import dsrv
 
 rng = np.random.default_rng(7)

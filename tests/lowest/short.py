@@ -19,7 +19,7 @@ import numpy as np
 
 import jaxsub
 from jaxsub.recording import Recording, load, save
-from jaxsub.simulate.synthetic import synthetic
+from jaxsub.simulation.synthesis import synthetic
 from jaxsub.vehicle import AbstractVehicle, vehicle_text
 from jaxsub.vehicle.catalogue import dsrv
 

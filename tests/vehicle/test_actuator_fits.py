@@ -11,7 +11,7 @@ from rigs import driven, stacked
 from jaxsub.discrepancy import diagnose
 from jaxsub.effects import ActuatorDelay, ActuatorLag, QuadraticDamping, SensorScale, ThrusterCrossCoupling
 from jaxsub.estimate import fit
-from jaxsub.simulate import synthetic
+from jaxsub.simulation import synthetic
 from jaxsub.vehicle import vehicle_from, vehicle_text, with_coefficients
 
 PLACES = {"port": [-0.2, -0.15, 0.0], "starboard": [-0.2, 0.15, 0.0]}

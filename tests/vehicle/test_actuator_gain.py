@@ -18,7 +18,7 @@ from jaxsub.effects import (
     vocabulary,
 )
 from jaxsub.errors import InputError
-from jaxsub.simulate import at_rest, simulate, synthetic
+from jaxsub.simulation import at_rest, simulate, synthetic
 from jaxsub.vehicle import added_effects, vehicle_findings, vehicle_from, vehicle_text, with_coefficients
 
 PLACE, AHEAD, ACROSS = [-0.2, 0.15, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]

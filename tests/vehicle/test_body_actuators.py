@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from jaxsub.effects import EQUATIONS, VELOCITIES
 from jaxsub.recording import Recording
-from jaxsub.simulate import at_rest, integrate, simulate
+from jaxsub.simulation import at_rest, integrate, simulate
 from jaxsub.vehicle import vehicle_findings, vehicle_from, vehicle_text
 
 RHO, G = 1025.0, 9.80665

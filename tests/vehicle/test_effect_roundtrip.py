@@ -15,7 +15,7 @@ from jaxsub.effects import (
     WaveForcing,
     options,
 )
-from jaxsub.simulate import at_rest, simulate
+from jaxsub.simulation import at_rest, simulate
 from jaxsub.vehicle import read_vehicle, vehicle_from, vehicle_text, write_vehicle
 
 BODY, RIG = body(), coupled()

@@ -18,7 +18,7 @@ from jaxsub.effects import (
     SpeedScaling,
     TrimOffset,
 )
-from jaxsub.simulate import at_rest, simulate
+from jaxsub.simulation import at_rest, simulate
 from jaxsub.vehicle import read_vehicle, vehicle_from, vehicle_text, write_vehicle
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii, remus_100
 

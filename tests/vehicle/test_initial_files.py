@@ -12,7 +12,7 @@ from jaxsub.checks import check
 from jaxsub.errors import InputError
 from jaxsub.estimate import fit
 from jaxsub.recording import Recording
-from jaxsub.simulate import integrate, synthetic
+from jaxsub.simulation import integrate, synthetic
 from jaxsub.units import si_unit
 from jaxsub.vehicle import initial_file, vehicle_findings, vehicle_from
 

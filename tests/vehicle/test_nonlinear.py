@@ -10,7 +10,7 @@ from rigs import driven, stacked
 
 from jaxsub.effects import EQUATIONS, Current, QuadraticDamping
 from jaxsub.errors import InputError
-from jaxsub.simulate import at_rest, simulate
+from jaxsub.simulation import at_rest, simulate
 from jaxsub.vehicle import vehicle_from, vehicle_text
 
 MASS, INERTIA, CG, CB = 60.0, (1.1, 12.0, 13.0), (0.02, -0.01, 0.03), (-0.015, 0.005, -0.02)

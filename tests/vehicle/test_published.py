@@ -7,7 +7,7 @@ from rigs import stacked
 from scipy.integrate import solve_ivp
 
 from jaxsub.recording import Recording
-from jaxsub.simulate import at_rest, integrate, simulate
+from jaxsub.simulation import at_rest, integrate, simulate
 from jaxsub.vehicle.catalogue import remus_100_nonlinear
 
 

@@ -10,7 +10,7 @@ from rigs import coupled, recorded
 
 from jaxsub.errors import InputError
 from jaxsub.estimate import fit
-from jaxsub.identifiability import identifiability
+from jaxsub.information import identifiability
 from jaxsub.vehicle import vehicle_from, vehicle_text
 
 TREE = {

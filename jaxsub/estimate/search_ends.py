@@ -1,0 +1,57 @@
+"""What is said of the ends of many searches at once: how sure each estimate is, and whether it is one."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..results import RESULTS
+from .damped import room_downhill
+from .fitting import inverse_information, judged, standard_errors_away
+from .method import Found, in_shares, lanes_for, problems
+from .problem import Problem
+
+
+class Ends(eqx.Module):
+    """Where N searches ended, in physical units.
+
+    **Fields**
+
+    - `theta`, `standard_errors`: (N, p) of the free parameters, the initial states' uncertainty included.
+    - `away`: (N,) how many standard errors the optimum may still be away. `result`: as `Fit` has it.
+    """
+
+    theta: Float[Array, "n p"]
+    standard_errors: Float[Array, "n p"]
+    away: Float[Array, " n"]
+    result: RESULTS
+
+
+def ends(problem: Problem, found: Found, outputs: Float[Array, "n r k c"] | None = None) -> Ends:
+    """What `evaluate` says of a `Fit`, of every search that `found` holds. Not to be called in `jit`."""
+    theta, errors, away = in_shares(_told, None, problem, found.y, outputs)
+    return Ends(theta, errors, away, _judged(problem, theta, away, found.result))
+
+
+@eqx.filter_jit
+def _told(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array | None) -> tuple[Array, Array, Array]:
+    of, p = problems(problem, outputs), len(problem.prior_mean)
+
+    def one(part: tuple[Array, Array]) -> tuple[Array, Array, Array]:
+        index, y = part
+        at = of(index).expand(y)
+        information = at.hessian
+        room = room_downhill(problem.along, y, at.gradient)
+        away = jnp.max(standard_errors_away(information, at.gradient, room)[:p], initial=0.0)
+        theta, slope = jax.jvp(problem.transform.to_physical, (y[:p],), (jnp.ones(p),))
+        errors = jnp.abs(slope) * jnp.sqrt(jnp.diag(inverse_information(information))[:p])
+        return theta, errors, away
+
+    return jax.lax.map(one, (jnp.arange(len(y)), y), batch_size=lanes_for(problem))
+
+
+@eqx.filter_jit
+def _judged(problem: Problem, theta: Float[Array, "n p"], away: Float[Array, " n"], result: RESULTS) -> RESULTS:
+    names = [row.name for row in problem.vehicle.layout.free]
+    vehicle = lambda theta: problem.vehicle.with_values(dict(zip(names, theta, strict=True)))
+    return jax.vmap(lambda theta, away, result: judged(vehicle(theta), away, result))(theta, away, result)
