@@ -6,7 +6,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.estimate import Fit, Problem, gauss_newton, scattered
+from jaxsub.estimate import Problem, Solution, gauss_newton, scattered
 from jaxsub.information import equivalent_systems, identifiability, identifiable_subset, profile
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import nps_auv_ii
@@ -51,7 +51,7 @@ def run(out: Path, quick: bool) -> dict:
     }
 
 
-def optimum(problem: Problem) -> Fit:
+def optimum(problem: Problem) -> Solution:
     """The fit that Gauss–Newton reaches from a start 20 % off."""
     return setup.fitted(problem, gauss_newton().run(problem, scattered(problem, 0.2, 1, SEED)).one(0))
 

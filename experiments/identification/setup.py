@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxsub.control import scenario_one, scenario_two
-from jaxsub.estimate import Ended, Fit, Found, Problem, batch, evaluate
+from jaxsub.estimate import Found, Problem, SearchEnd, Solution, batch, evaluate
 from jaxsub.recording import Recording
 from jaxsub.simulation import at_rest
 from jaxsub.vehicle import AbstractVehicle
@@ -54,11 +54,11 @@ def problem(vehicle: AbstractVehicle, recorded: Sequence[Recording]) -> Problem:
     return Problem.of(vehicle, runs, sigma(vehicle), at_rest(vehicle, len(recorded)), known_start=True)
 
 
-def fitted(problem: Problem, found: Found) -> Fit:
+def fitted(problem: Problem, found: Found) -> Solution:
     """The fit where one search ended."""
     vehicle, states = problem.split(found.y)
     told = found.cost, found.evaluations, found.result
-    return evaluate(Ended(vehicle, problem.runs, states, problem.sigma, *told, known_start=True))
+    return evaluate(SearchEnd(vehicle, problem.runs, states, problem.sigma, *told, known_start=True))
 
 
 def relative_errors(vehicle: AbstractVehicle, true: AbstractVehicle) -> dict[str, float]:

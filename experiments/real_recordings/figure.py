@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from jaxsub.discrepancy import Diagnosis
+from jaxsub.discrepancy import Conclusions
 from jaxsub.discrepancy.diagnosis import Overlay
 from jaxsub.report.drawing import BASELINE, GREY, IMPROVED, INK, new_figure, png, style, thin
 
@@ -14,7 +14,7 @@ from .case import Case
 _MOST_RUNS = 3
 
 
-def draw_held_out(diagnosis: Diagnosis, case: Case, path: Path) -> None:
+def draw_held_out(diagnosis: Conclusions, case: Case, path: Path) -> None:
     """Up to three held-out runs side by side; each channel's traces with the errors below them, in field units."""
     chosen = _spread(diagnosis.overlays)
     channels = list(case.channels)

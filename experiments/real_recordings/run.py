@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from jaxsub.cli.diagnose import diagnosed
-from jaxsub.discrepancy import Diagnosis
+from jaxsub.discrepancy import Conclusions
 from jaxsub.discrepancy.diagnosis import Estimate
 from jaxsub.vehicle import read_vehicle
 
@@ -15,7 +15,7 @@ from .case import Case, FieldUnit
 from .figure import draw_held_out
 
 
-def diagnose_case(case: Case, folder: Path) -> tuple[Diagnosis, dict]:
+def diagnose_case(case: Case, folder: Path) -> tuple[Conclusions, dict]:
     """The diagnosis and its numbers in field units.
 
     `folder` then holds the vehicle file, `diagnosis.json`, `improved.toml`, the report and `held_out.png`.
@@ -33,7 +33,7 @@ def diagnose_case(case: Case, folder: Path) -> tuple[Diagnosis, dict]:
     return diagnosis, {**numbers(diagnosis, case), "seconds": round(seconds, 1), "by_hand": by_hand(case, folder)}
 
 
-def numbers(diagnosis: Diagnosis, case: Case) -> dict:
+def numbers(diagnosis: Conclusions, case: Case) -> dict:
     """What was left out, how large it is, what it is worth on the held-out runs, and what remains."""
     scaled = lambda rms: {f"{c} ({case.channels[c][1]})": case.channels[c][0] * value for c, value in rms.items()}
     return {

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from jaxsub.discrepancy import Diagnosis
+from jaxsub.discrepancy import Conclusions
 from jaxsub.recording import Recording
 
 from ..data import data_folder
@@ -145,7 +145,7 @@ def report(out: Path) -> dict:
     return results
 
 
-def fit_percent(diagnosis: Diagnosis, which: str) -> dict[str, float]:
+def fit_percent(diagnosis: Conclusions, which: str) -> dict[str, float]:
     r"""$100(1-\lVert y-\hat y\rVert/\lVert y-\bar y\rVert)$ by channel over all held-out runs."""
     found = {}
     for channel in diagnosis.overlays[0].measured:

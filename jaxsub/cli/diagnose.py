@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.panel import Panel
 from rich.text import Text
 
-from ..discrepancy import Diagnosis
+from ..discrepancy import Conclusions
 from ..discrepancy import diagnose as diagnose_runs
 from ..discrepancy.decisions import decision_rows
 from ..discrepancy.next_run import next_run, said
@@ -94,7 +94,7 @@ def _held(answer: "Answer", out: Path) -> str:
 class Answer:
     """A diagnosis, the improved vehicle, and the inputs of the run that would tell rivals apart, if there are any."""
 
-    diagnosis: Diagnosis
+    diagnosis: Conclusions
     improved: AbstractVehicle
     next_run: Recording | None
 
@@ -138,7 +138,7 @@ def diagnosed(
     watch = options().watch
     with terminal.progress(f"diagnosing {vehicle.layout.name}") as told, ExitStack() as kept:
 
-        def keep_and_heed(diagnosis: Diagnosis, improved: AbstractVehicle) -> None:
+        def keep_and_heed(diagnosis: Conclusions, improved: AbstractVehicle) -> None:
             keep(diagnosis, improved)
             # before there is an answer an interruption ends all at once
             if watch is not None:
@@ -168,7 +168,7 @@ def diagnosed(
         return Answer(dataclasses.replace(diagnosis, next_manoeuvre=advice), improved, found.recording)
 
 
-def show(diagnosis: Diagnosis, explain: bool = False) -> None:
+def show(diagnosis: Conclusions, explain: bool = False) -> None:
     """The verdict, the effects that were named, and the errors on the test runs, on standard output.
 
     `explain` adds a row for every decision, in order.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..estimate import Assessment, ChannelResidual, Fit
+from ..estimate import Assessment, ChannelResidual, Solution
 from ..findings import Finding
 from ..information import Coloured, Estimate, Identifiability, estimates
 from ..plain import to_json
@@ -30,7 +30,7 @@ class Identification:
     - `complete`: whether nothing was interrupted.
     """
 
-    fit: Fit
+    fit: Solution
     method: str
     where: str
     assessment: Assessment

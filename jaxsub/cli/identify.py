@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, OutputError
-from ..estimate import METHODS, Fit, Passes, assess, batch, fit, posterior, require_free
+from ..estimate import METHODS, Passes, Solution, assess, batch, fit, posterior, require_free
 from ..information import coloured_covariance, identifiability
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle, read_vehicle
@@ -86,7 +86,7 @@ def _write_posterior(drawn: Any, path: Path) -> None:
         path.write_bytes((Path(folder) / path.name).read_bytes())
 
 
-def _fitted(vehicle: AbstractVehicle, runs: Runs, method: str, where: str, passes: Passes) -> Fit:
+def _fitted(vehicle: AbstractVehicle, runs: Runs, method: str, where: str, passes: Passes) -> Solution:
     """The fit of the vehicle, read from `where`. **Raises** `InputError` where the model does not run."""
     # Gauss–Newton by its own name is what `fit` does unasked, and that finds a start where the file's does not run
     chosen = None if method == "gauss-newton" else METHODS[method.replace("-", "_")]()

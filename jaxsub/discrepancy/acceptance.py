@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import AbstractEffect, AbstractMemory
-from ..estimate import Ended, Fit, substeps_for, substeps_unseen
+from ..estimate import AbstractSearchEnd, Solution, substeps_for, substeps_unseen
 from ..likelihood import Disturbance
 from ..vehicle import AbstractVehicle
 from .cross_validation import Comparison, Predicted, compare, one_step_ahead, simulated
@@ -66,7 +66,7 @@ class Model(NamedTuple):
     - `pieces`: of a run, in each of which its simulation is re-initialised.
     """
 
-    fit: Ended
+    fit: AbstractSearchEnd
     view: View
     predicted: Predicted
     added: tuple[AbstractEffect, ...]
@@ -118,7 +118,7 @@ class ModelFitter:
         return fitted_model(joined, view, (*model.added, *effects))
 
 
-def fitted_model(fit: Fit, view: View, added: tuple[AbstractEffect, ...]) -> Model:
+def fitted_model(fit: Solution, view: View, added: tuple[AbstractEffect, ...]) -> Model:
     """The model of a fit and of the view of it."""
     return Model(fit, view, Predicted(one_step_ahead(view), simulated(fit)), added)
 

@@ -22,7 +22,7 @@ from jaxtyping import Float
 from scipy import special
 
 from ..arrays import quietly
-from ..estimate import Fit, Problem
+from ..estimate import Problem, Solution
 from .evidence import conditional
 from .settings import BLOCKS, BLOCKS_ONE_STEP, CLEAR_LOG_BAYES, LEVEL, SIGNIFICANCE
 from .view import Parts, View
@@ -124,7 +124,7 @@ def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
 
 
 @quietly
-def simulated(fit: Fit, blocks: int = BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
+def simulated(fit: Solution, blocks: int = BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
     """`Predicted.simulation` of a fit, in so many `blocks` a run; the initial states may be `known_start`."""
     products = _simulation_products(fit, blocks)
     nowhere = np.full(products.shape[0] * products.shape[1], -np.inf)
@@ -174,7 +174,7 @@ def _left(others: Float[np.ndarray, "q q"], block: Float[np.ndarray, "q q"]) -> 
     return float(at @ block @ at)
 
 
-def _simulation_products(fit: Fit, blocks: int) -> Float[np.ndarray, "r b q q"]:
+def _simulation_products(fit: Solution, blocks: int) -> Float[np.ndarray, "r b q q"]:
     """Products by block of simulation errors over σ and their derivatives by free numbers and the initial state."""
     runs, model = fit.runs, fit.model.whole
     weight = (np.asarray(runs.mask) / np.asarray(fit.sigma))[..., None]

@@ -221,7 +221,7 @@ class RunQuality:
 
 
 @dataclasses.dataclass(frozen=True)
-class Diagnosis:
+class Conclusions:
     """The answer to "what physics was left out", with all that shows it.
 
     `history` is (`baseline` or the label of the effect accepted next, held-out rms error by channel in SI). `fit` maps

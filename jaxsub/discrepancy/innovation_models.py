@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..effects import AbstractEffect
-from ..estimate import Ended, evaluate, initial_guess, substeps_for
+from ..estimate import SearchEnd, evaluate, initial_guess, substeps_for
 from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import SUCCESSFUL
 from ..vehicle import AbstractVehicle
@@ -75,7 +75,7 @@ class InnovationModels:
     def _model(self, model: Model, view: View, effects: Sequence[AbstractEffect]) -> Model:
         start, _ = initial_guess(view.vehicle, view.runs)
         cost = jnp.asarray(-evidence_of(view))
-        ended = Ended(view.vehicle, view.runs, start, view.sigma, cost, jnp.asarray(0), SUCCESSFUL)
+        ended = SearchEnd(view.vehicle, view.runs, start, view.sigma, cost, jnp.asarray(0), SUCCESSFUL)
         predicted = model.predicted._replace(one_step=one_step_ahead(view))
         return Model(ended, view, predicted, (*model.added, *effects), model.pieces)
 
@@ -148,7 +148,7 @@ def segmented(model: Model, pieces: int) -> Model:
     """A model with its view's parameters whose simulation is re-initialised in every segment by its filter."""
     view = model.view
     runs, start = view.runs.segments(pieces), starts(view.followed, pieces)
-    ended = Ended(view.vehicle, runs, start, view.sigma, model.fit.cost, model.fit.steps, SUCCESSFUL)
+    ended = SearchEnd(view.vehicle, runs, start, view.sigma, model.fit.cost, model.fit.steps, SUCCESSFUL)
     blocks = max(1, BLOCKS // pieces)
     predicted = model.predicted._replace(simulation=simulated(evaluate(ended), blocks, known_start=True))
     return Model(ended, view, predicted, model.added, pieces)

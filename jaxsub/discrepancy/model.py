@@ -8,7 +8,7 @@ import numpy as np
 from scipy import special
 
 from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, numbers, with_numbers
-from ..estimate import Ended, Fit, by_cost, evaluate, race, search
+from ..estimate import AbstractSearchEnd, Solution, by_cost, evaluate, race, search
 from ..information import coloured_covariance
 from ..vehicle import AbstractVehicle
 from .settings import NEGLIGIBLE, SIGNIFICANCE
@@ -20,11 +20,11 @@ _NO_COLUMN = 1e-100
 
 def fit_with(
     view: View,
-    fit: Ended,
+    fit: AbstractSearchEnd,
     effects: Sequence[AbstractEffect],
     file: AbstractVehicle,
     near: Sequence[AbstractVehicle] = (),
-) -> Fit:
+) -> Solution:
     """The vehicle of `fit` with `effects` added, fitted in simulation: multi-start maximum likelihood.
 
     Starts are the parameters by innovations (`view`), those of the `file`, and the vehicles `near`: a fit without the
@@ -45,7 +45,7 @@ def fit_with(
     return evaluate(best)
 
 
-def refit(fit: Ended, start: AbstractVehicle) -> Fit:
+def refit(fit: AbstractSearchEnd, start: AbstractVehicle) -> Solution:
     """The fit of `start` to the runs of a fit."""
     return evaluate(search(start, fit.runs, sigma=fit.sigma))
 
@@ -58,7 +58,7 @@ def with_scaled_effects(vehicle: AbstractVehicle, effects: Sequence[AbstractEffe
     return vehicle
 
 
-def is_admissible(fit: Ended, effects: Sequence[AbstractEffect]) -> bool:
+def is_admissible(fit: AbstractSearchEnd, effects: Sequence[AbstractEffect]) -> bool:
     """Whether physics admits the fitted parameters of all `effects`, and none of them vanished.
 
     A memory shorter than a sample acts as a coefficient does. One longer than the runs is a constant in each, as large
@@ -103,7 +103,7 @@ def amplitude_indices(view: View, effect: AbstractEffect) -> list[int]:
     return [names.index(f"{effect.label}.{symbols[name]}") for name in amplitudes(effect) or symbols]
 
 
-def with_coloured_errors(view: View, ended: Ended) -> Fit:
+def with_coloured_errors(view: View, ended: AbstractSearchEnd) -> Solution:
     """The fit where a search ended, with standard errors that allow for the view's disturbance."""
     fit = evaluate(ended)
     return dataclasses.replace(fit, covariance=coloured_covariance(fit, view.disturbance).covariance)

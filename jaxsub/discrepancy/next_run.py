@@ -6,14 +6,14 @@ import jax.numpy as jnp
 
 from ..estimate import batch, search
 from ..recording import Recording
-from .diagnosis import Diagnosis
+from .diagnosis import Conclusions
 from .manoeuvre import Manoeuvre, separating_manoeuvre
 
 # s: a longer one costs more than it separates
 _LONGEST = 120.0
 
 
-def next_run(diagnosis: Diagnosis, train: Sequence[Recording]) -> Manoeuvre | None:
+def next_run(diagnosis: Conclusions, train: Sequence[Recording]) -> Manoeuvre | None:
     """The inputs whose recording would best separate the diagnosis' explanations of the runs `train`.
 
     It begins as the first of them, within the limits that it kept. None where nothing is ambiguous or nothing can be

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..effects import FORCE_UNITS, AbstractEffect
 from ..errors import InputError
-from ..estimate import Fit, batch, fit
+from ..estimate import Solution, batch, fit
 from ..findings import Finding
 from ..recording import Recording
 from ..results import RESULTS
@@ -16,7 +16,7 @@ from ..vehicle import AbstractVehicle, vehicle_findings
 from .acceptance import Examination, Model, ModelFitter, fitted_model
 from .advice import next_manoeuvre
 from .consistency import consistent
-from .diagnosis import Candidate, Diagnosis, Location, Physics, Rival
+from .diagnosis import Candidate, Conclusions, Location, Physics, Rival
 from .evaluation import overlays
 from .examine import examine
 from .innovation_models import segmented
@@ -37,7 +37,7 @@ from .verdict import Judged
 from .view import View, look
 
 # receives each answer before the last: the diagnosis, which is not `complete`, and the improved vehicle
-Keep = Callable[[Diagnosis, AbstractVehicle], object]
+Keep = Callable[[Conclusions, AbstractVehicle], object]
 
 
 def diagnose(
@@ -51,7 +51,7 @@ def diagnose(
     stop: Callable[[], bool] = lambda: False,
     keep: Keep = lambda diagnosis, improved: None,
     begin: Sequence[AbstractEffect] = (),
-) -> tuple[Diagnosis, AbstractVehicle]:
+) -> tuple[Conclusions, AbstractVehicle]:
     """What physics `vehicle` leaves out according to the runs `train`, shown on the runs `test`.
 
     Nothing of the runs `test` takes part in a decision: the models are simulated along them once, at the end. Returns
@@ -98,13 +98,13 @@ class _Account:
     baseline: Model
 
     @cached_property
-    def start(self) -> Fit:
+    def start(self) -> Solution:
         """The baseline's fit, with errors that allow for its disturbance: the same in every answer."""
         return with_coloured_errors(self.baseline.view, self.baseline.fit)
 
     def of(
         self, named: Model, best: Model, judged: Judged, test: Sequence[Recording]
-    ) -> tuple[Diagnosis, AbstractVehicle]:
+    ) -> tuple[Conclusions, AbstractVehicle]:
         """The diagnosis, and the improved vehicle: the `best` model, of which the `named` one has the numbers of names.
 
         Without a `test` run nothing is shown of any.
@@ -122,7 +122,7 @@ class _Account:
         own = improved if named is best else with_coloured_errors(named.view, named.fit)
         physics = [_physics(one, own) for one in judged.named]
         found = None if shown is None else shown.explained
-        diagnosis = Diagnosis(
+        diagnosis = Conclusions(
             verdict=judged.verdict,
             vehicle=layout.name,
             summary=summary(judged.verdict, physics, where, standing, found, judged.p_value),
@@ -201,7 +201,7 @@ def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVe
     return (improved, *(without.with_effect(rival) for rival in rivals))
 
 
-def _physics(named: Named, improved: Fit) -> Physics:
+def _physics(named: Named, improved: Solution) -> Physics:
     """An accepted effect with its numbers from the final fit."""
     effect = next((e for e in improved.vehicle.effects if e.label == named.effect.label), named.effect)
     rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals[:LISTED]]

@@ -20,7 +20,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values
 from ..effects import AbstractActuator
-from ..estimate import Fit
+from ..estimate import Solution
 from ..filter import (
     AbstractNoiseRule,
     ConstantNoise,
@@ -79,7 +79,7 @@ class NoiseSignal:
         return sorted((e for e in peak if peak[e] > self.threshold), key=lambda e: -peak[e])
 
 
-def noise_signals(fit: Fit, recordings: Sequence[Recording], copies: int = 19) -> list[NoiseSignal]:
+def noise_signals(fit: Solution, recordings: Sequence[Recording], copies: int = 19) -> list[NoiseSignal]:
     """The signal of each run of a fit, calibrated on clean `copies` of all runs, of which 19 are the fewest.
 
     None where no filter can follow: a vehicle with an effect on an actuator, a run on which the filter

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..estimate import Fit
+from ..estimate import Solution
 from ..recording import Recording
 from .diagnosis import ChannelQuality, Coefficient, Estimate, RunQuality
 from .settings import CORRELATED, UNEXCITED_ERROR, WEAK_ERROR
 from .whiteness import record_sigma
 
 
-def coefficients(start: dict[str, float], baseline: Fit, improved: Fit) -> list[Coefficient]:
+def coefficients(start: dict[str, float], baseline: Solution, improved: Solution) -> list[Coefficient]:
     """Every free number before and after."""
     rows = []
     for name in improved.names:
@@ -22,20 +22,20 @@ def coefficients(start: dict[str, float], baseline: Fit, improved: Fit) -> list[
     return rows
 
 
-def _estimate(fit: Fit, name: str) -> Estimate | None:
+def _estimate(fit: Solution, name: str) -> Estimate | None:
     if name not in fit.names:
         return None
     unit = next(row.unit for row in fit.vehicle.layout.free if row.name == name)
     return Estimate(fit.values[name], fit.standard_errors[name], unit)
 
 
-def estimates(fit: Fit, label: str, symbols: dict[str, str]) -> dict[str, Estimate]:
+def estimates(fit: Solution, label: str, symbols: dict[str, str]) -> dict[str, Estimate]:
     """The fitted numbers of one effect by symbol."""
     found = {symbol: _estimate(fit, f"{label}.{symbol}") for symbol in symbols.values()}
     return {symbol: estimate for symbol, estimate in found.items() if estimate is not None}
 
 
-def trades(fit: Fit, label: str) -> dict[str, float]:
+def trades(fit: Solution, label: str) -> dict[str, float]:
     """The parameters whose estimates are correlated with those of one effect by 0.9 and more.
 
     The strongest first; an effect's own among each other are its shape, and not listed.
@@ -56,7 +56,7 @@ def _verdict(estimate: Estimate) -> str:
     return "identified" if ratio < WEAK_ERROR else "weak" if ratio < UNEXCITED_ERROR else "not excited"
 
 
-def channel_quality(fit: Fit) -> list[ChannelQuality]:
+def channel_quality(fit: Solution) -> list[ChannelQuality]:
     """Samples and noise of each measured channel of the training runs."""
     mask, error, stated = np.asarray(fit.runs.mask), np.asarray(fit.model.error), np.asarray(fit.sigma)
     white = record_sigma(error, mask)

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from ..arrays import quietly
 from ..effects import Facts, wave_band
-from ..estimate import Fit, Problem, by_cost
+from ..estimate import Problem, Solution, by_cost
 from ..likelihood import (
     Columns,
     Disturbance,
@@ -97,7 +97,7 @@ class View:
         return np.asarray(self.runs.outputs)[..., column][np.asarray(self.runs.mask)[..., column]]
 
 
-def look(fit: Fit, disturbance: Disturbance | None = None, near: AbstractVehicle | None = None) -> View:
+def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVehicle | None = None) -> View:
     """The view of a fit, its free parameters and disturbance re-estimated by innovations.
 
     The disturbance starts from a guess by the residuals, or from the given one, of a view of nearly the same model,
@@ -180,7 +180,7 @@ def _guessed(model: Linearised, runs: Runs, sigma: Array, spread: Array) -> Dist
     return first_guess(System.of(model, runs, sigma, spread), model.error / sigma)
 
 
-def _white(fit: Fit) -> np.ndarray:
+def _white(fit: Solution) -> np.ndarray:
     """The first guess of each channel's noise, in units of the fit's: the white part of its errors.
 
     A sigma that the file leaves open has so far absorbed the whole simulation error, which may be a thousand times it.

@@ -1,11 +1,21 @@
-"""Estimation: one `fit`, one `Fit`, and the methods that may do it."""
+"""Estimation: one `fit`, one `Solution`, and the methods that may do it."""
 
 from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_residuals
 from .batches import batch, side_by_side
 from .combined import Chain, Global
 from .disturbance import estimate_disturbance
 from .filtered import Filtered
-from .fitting import Ended, Fit, channel_rms, evaluate, fit, information_matrix, race, search
+from .fitting import (
+    AbstractSearchEnd,
+    SearchEnd,
+    Solution,
+    channel_rms,
+    evaluate,
+    fit,
+    information_matrix,
+    race,
+    search,
+)
 from .initial_states import initial_guess, rest, state_channels
 from .integration_steps import substeps_for, substeps_unseen
 from .method import AbstractMethod, Found, Iterative, Passes, by_cost, share_for, shares_at_once
@@ -20,21 +30,22 @@ __all__ = [
     "MARGIN",
     "METHODS",
     "AbstractMethod",
+    "AbstractSearchEnd",
     "Assessment",
     "Basin",
     "Chain",
     "ChannelResidual",
-    "Ended",
     "Ends",
     "Expansion",
     "Filtered",
-    "Fit",
     "Found",
     "Global",
     "Iterative",
     "Passes",
     "Problem",
     "Rate",
+    "SearchEnd",
+    "Solution",
     "assess",
     "assess_residuals",
     "basins",

@@ -18,7 +18,7 @@ from ..findings import Finding
 from ..likelihood import output_errors
 from ..likelihood.whiteness import portmanteau_by_channel, predicted_share
 from ..plain import plain
-from .fitting import Ended, Fit
+from .fitting import AbstractSearchEnd, Solution
 
 # probability of a false alarm of each test
 LEVEL = 0.01
@@ -169,10 +169,10 @@ class Assessment:
         return f"explains these runs: {size}; {colour}"
 
 
-def assess(found: Ended) -> Assessment:
+def assess(found: AbstractSearchEnd) -> Assessment:
     """Whether a fit explains the runs that it was made of; σ that the vehicle leaves open has no test of size."""
     vehicle, runs = found.vehicle, found.runs
-    error = found.model.error if isinstance(found, Fit) else output_errors(vehicle, runs, found.start)
+    error = found.model.error if isinstance(found, Solution) else output_errors(vehicle, runs, found.start)
     known = [output.sigma is not None for output in vehicle.layout.outputs]
     fitted = len(found.names) + (0 if found.known_start else found.start.size)
     return assess_residuals(

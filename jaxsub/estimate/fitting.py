@@ -1,7 +1,8 @@
-"""One `fit`, one `Fit`: maximum likelihood by whichever method."""
+"""One `fit`, one `Solution`: maximum likelihood by whichever method."""
 
 import dataclasses
 from collections.abc import Sequence
+from typing import final
 
 import equinox as eqx
 import jax
@@ -28,8 +29,8 @@ _CONCENTRATIONS = 12
 _MATTERS = 0.1
 
 
-class Ended(eqx.Module):
-    """Where a search ended, without any statistics.
+class AbstractSearchEnd(eqx.Module):
+    """A vehicle with the numbers that a search found for R runs, and how the search ended.
 
     **Fields**
 
@@ -38,14 +39,14 @@ class Ended(eqx.Module):
     - `known_start`: whether `start` was given.
     """
 
-    vehicle: AbstractVehicle
-    runs: Runs
-    start: Float[Array, "r s"]
-    sigma: Float[Array, " c"]
-    cost: Float[Array, ""]
-    steps: Array
-    result: RESULTS
-    known_start: bool = eqx.field(static=True, default=False, kw_only=True)
+    vehicle: eqx.AbstractVar[AbstractVehicle]
+    runs: eqx.AbstractVar[Runs]
+    start: eqx.AbstractVar[Float[Array, "r s"]]
+    sigma: eqx.AbstractVar[Float[Array, " c"]]
+    cost: eqx.AbstractVar[Float[Array, ""]]
+    steps: eqx.AbstractVar[Array]
+    result: eqx.AbstractVar[RESULTS]
+    known_start: eqx.AbstractVar[bool]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -71,10 +72,25 @@ class Ended(eqx.Module):
         return Problem.of(self.vehicle, self.runs, self.sigma, start, known_start=self.known_start)
 
 
-class Fit(Ended):
-    """What an estimation found.
+@final
+class SearchEnd(AbstractSearchEnd):
+    """Where a search ended, without any statistics; fields as of `AbstractSearchEnd`."""
 
-    **Fields** beside those of `Ended`
+    vehicle: AbstractVehicle
+    runs: Runs
+    start: Float[Array, "r s"]
+    sigma: Float[Array, " c"]
+    cost: Float[Array, ""]
+    steps: Array
+    result: RESULTS
+    known_start: bool = eqx.field(static=True, default=False, kw_only=True)
+
+
+@final
+class Solution(AbstractSearchEnd):
+    """What an estimation found: where its search ended, with statistics.
+
+    **Fields** beside those of `AbstractSearchEnd`
 
     - `covariance`: of the p free parameters, physical units; the initial states' uncertainty is included.
     - `model`: the vehicle linearised along the fitted trajectory, block by block.
@@ -83,10 +99,18 @@ class Fit(Ended):
     - `pressed`: (p,) -1 for a parameter that presses on its lower bound, 1 on its upper one, 0 for any other.
     """
 
+    vehicle: AbstractVehicle
+    runs: Runs
+    start: Float[Array, "r s"]
+    sigma: Float[Array, " c"]
+    cost: Float[Array, ""]
+    steps: Array
+    result: RESULTS
     covariance: Float[Array, "p p"]
     model: BlockLinearised
     gradient_norm: Float[Array, ""]
     pressed: Float[Array, " p"]
+    known_start: bool = eqx.field(static=True, default=False, kw_only=True)
 
     @property
     def at_bound(self) -> dict[str, str]:
@@ -129,7 +153,7 @@ def search(
     moving: bool = True,
     known_start: bool = False,
     passes: Passes | None = None,
-) -> Ended:
+) -> SearchEnd:
     """The maximum-likelihood vehicle, initial states and noise.
 
     `method` is Gauss–Newton where none is given. `known_start` takes the initial states `start` for the truth. `moving`
@@ -158,16 +182,16 @@ def search(
         problem = dataclasses.replace(problem, sigma=jnp.where(estimated & (rms > 0.0), rms, problem.sigma))
         if settled:
             break
-    return Ended(fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=known_start)
+    return SearchEnd(fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=known_start)
 
 
-def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " c"]) -> Ended:
+def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " c"]) -> SearchEnd:
     """The best of searches from several vehicles, as `search` finds it; those that fall behind are given up."""
     begun = [Problem.of(vehicle, runs, sigma) for vehicle in vehicles]
     best = raced([Descent(gauss_newton(), problem, problem.coordinates()) for problem in begun])
     found = best.found.one(0)
     fitted, states = best.problem.split(found.y)
-    return Ended(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
+    return SearchEnd(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
 
 
 @eqx.filter_jit
@@ -188,14 +212,15 @@ def fit(
     start: Array | None = None,
     known_start: bool = False,
     passes: Passes | None = None,
-) -> Fit:
+) -> Solution:
     """Fit the free numbers of `vehicle`, and an initial state for each run, to `recordings` or the `batch` of them.
 
     `method` is Gauss–Newton where none is given; where that does not run or arrive, also from the end of a filter, and
     the more probable is taken. The simulation of an unstable model diverges, while a filter follows the
     measurements, and its estimates allow for missing physics. `sigma` overrides the file's noise; `start` is
-    where the initial states' search begins, or with `known_start` what they are. A failure is a value in `Fit.result`,
-    no exception. `passes` is told how many passes over long runs are done and expected (`AbstractMethod.run`).
+    where the initial states' search begins, or with `known_start` what they are. A failure is a value in
+    `Solution.result`, no exception. `passes` is told how many passes over long runs are done and expected
+    (`AbstractMethod.run`).
     """
     runs = recordings if isinstance(recordings, Runs) else batch(vehicle, recordings)
     by = lambda method: _fitted(vehicle, runs, method, sigma, start, known_start, passes)
@@ -213,7 +238,7 @@ def _fitted(
     start: Array | None,
     known_start: bool,
     passes: Passes | None,
-) -> Fit:
+) -> Solution:
     tell = passes or unwatched
     # one pass more, for the statistics
     with_statistics = lambda done, expected: tell(done, expected + 1.0)
@@ -224,22 +249,22 @@ def _fitted(
     return evaluate(ended, lambda share: tell(taken + share, taken + 1.0))
 
 
-def _improbable(found: Fit) -> float:
+def _improbable(found: Solution) -> float:
     """Minus the log likelihood, noise that was estimated included; infinite where the model did not run."""
     value = float(found.cost + jnp.sum(found.runs.samples() * jnp.log(found.sigma)))
     return value if np.isfinite(value) else np.inf
 
 
-def evaluate(ended: Ended, watch: Watch = nobody) -> Fit:
-    """The `Fit` where a search ended; itself where it is one. `watch` is told the share of the samples that is done."""
-    if isinstance(ended, Fit):
+def evaluate(ended: AbstractSearchEnd, watch: Watch = nobody) -> Solution:
+    """The statistics of an end; itself where it has them. `watch` is told the share of the samples that is done."""
+    if isinstance(ended, Solution):
         return ended
     problem = ended.problem
     model = BlockLinearised.of(ended.vehicle, ended.runs, ended.start, ended.sigma, problem.spread, watch)
     covariance, gradient, pressed, result = _statistics(problem, model.products, ended.result)
     fields = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
     fields["result"] = result
-    return Fit(**fields, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
+    return Solution(**fields, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
 
 
 @eqx.filter_jit

@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Array, Float, Key, PRNGKeyArray
 
 from ..errors import InputError, optional
-from .fitting import Fit
+from .fitting import Solution
 from .problem import Problem
 
 # how far apart the chains start, in standard errors, so that their agreement says something
@@ -42,7 +42,7 @@ class Target(eqx.Module):
     estimated: tuple[bool, ...] = eqx.field(static=True)
 
     @classmethod
-    def of(cls, found: Fit) -> "Target":
+    def of(cls, found: Solution) -> "Target":
         """Of what `found` fitted. Raises InputError where the recordings leave a direction open."""
         problem = found.problem
         estimated = tuple(output.sigma is None for output in found.vehicle.layout.outputs)
@@ -84,7 +84,7 @@ class Target(eqx.Module):
         return dataclasses.replace(self.problem, sigma=sigma)
 
 
-def _information(found: Fit, problem: Problem, estimated: tuple[bool, ...]) -> Float[Array, "d d"]:
+def _information(found: Solution, problem: Problem, estimated: tuple[bool, ...]) -> Float[Array, "d d"]:
     """Fisher's of (y, log σ) from the fit's own linearised model; a residual of unit size has 2 in log σ."""
     p = len(found.names)
     _, slope = jax.jvp(problem.transform.to_physical, (problem.origin,), (jnp.ones(p),))
@@ -98,7 +98,7 @@ def _information(found: Fit, problem: Problem, estimated: tuple[bool, ...]) -> F
     return jax.scipy.linalg.block_diag(jnp.block([[corner, mixed], [mixed.T, own]]), noise)
 
 
-def posterior(found: Fit, *, draws: int = 1000, warmup: int = 300, chains: int = 4, seed: int = 0) -> Any:
+def posterior(found: Solution, *, draws: int = 1000, warmup: int = 300, chains: int = 4, seed: int = 0) -> Any:
     """Draws from the posterior of what `found` fitted: an ArviZ `InferenceData` (a `DataTree` from ArviZ 1 on).
 
     Group `posterior` holds each free coefficient under its name (chain, draw), `initial_state` (chain, draw, run,

@@ -18,7 +18,7 @@ class Ends(eqx.Module):
     **Fields**
 
     - `theta`, `standard_errors`: (N, p) of the free parameters, the initial states' uncertainty included.
-    - `away`: (N,) how many standard errors the optimum may still be away. `result`: as `Fit` has it.
+    - `away`: (N,) how many standard errors the optimum may still be away. `result`: as `Solution` has it.
     """
 
     theta: Float[Array, "n p"]
@@ -28,7 +28,7 @@ class Ends(eqx.Module):
 
 
 def ends(problem: Problem, found: Found, outputs: Float[Array, "n r k c"] | None = None) -> Ends:
-    """What `evaluate` says of a `Fit`, of every search that `found` holds. Not to be called in `jit`."""
+    """What `evaluate` says of a `Solution`, of every search that `found` holds. Not to be called in `jit`."""
     theta, errors, away = in_shares(_told, None, problem, found.y, outputs)
     return Ends(theta, errors, away, _judged(problem, theta, away, found.result))
 

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 
-from ..estimate import Fit
+from ..estimate import Solution
 from .coloured import Coloured
 from .directions import FRACTION
 from .rank import Identifiability
@@ -37,7 +37,7 @@ class Estimate:
     remedy: str = ""
 
 
-def estimates(fit: Fit, said: Identifiability | None, coloured: Coloured | None) -> list[Estimate]:
+def estimates(fit: Solution, said: Identifiability | None, coloured: Coloured | None) -> list[Estimate]:
     """The coefficients of a fit; what was not asked, because the command was ended, is None.
 
     Where the residuals' disturbance could not be estimated, the standard errors for white noise are multiplied by the

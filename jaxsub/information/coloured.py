@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from ..estimate import Fit, Problem
+from ..estimate import Problem, Solution
 from ..likelihood import Adjoint, Disturbance, Linearised, System, Watch, carried_back, carried_to_start, nobody
 from ..recording.runs import Runs
 from .residual_disturbance import Directions, residual_disturbance, whitened_columns
@@ -43,7 +43,7 @@ class Coloured(eqx.Module):
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
 
 
-def coloured_covariance(fit: Fit, disturbance: Disturbance | None = None, watch: Watch = nobody) -> Coloured:
+def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, watch: Watch = nobody) -> Coloured:
     """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed.
 
     The `disturbance` is estimated from the residuals where none is given. Coefficients at a bound are held there.

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import Fit, Problem
+from ..estimate import Problem, Solution
 from ..likelihood import BlockLinearised, Linearised, Watch, nobody
 from ..recording.runs import Runs
 from .residual_disturbance import whitened_columns
@@ -44,7 +44,7 @@ class Directions:
     uncertainty: np.ndarray
 
     @classmethod
-    def of(cls, fit: Fit, watch: Watch = nobody) -> "Directions":
+    def of(cls, fit: Solution, watch: Watch = nobody) -> "Directions":
         """The directions of a fit. `watch` is told the share of the samples that is done."""
         problem = fit.problem
         values, given = np.array(list(fit.values.values())), np.asarray(problem.prior_mean)

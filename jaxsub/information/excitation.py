@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import Fit
+from ..estimate import Solution
 from ..vehicle import AbstractVehicle
 
 # an entry below this part of its row's largest is rounding, and a fin with less of the moment is no way to excite it
@@ -33,7 +33,7 @@ class Excitation:
     inputs: tuple[str, ...]
 
     @classmethod
-    def of(cls, fit: Fit) -> "Excitation":
+    def of(cls, fit: Solution) -> "Excitation":
         """The excitation of a fit's recordings."""
         vehicle, layout = fit.vehicle, fit.vehicle.layout
         states = list(layout.states)
@@ -67,7 +67,7 @@ class Excitation:
         return f"vary {' and '.join(bases)}, which no recorded input drives" if bases else "record for longer"
 
 
-def _moments(fit: Fit) -> tuple[Float[np.ndarray, " z"], Float[np.ndarray, " z"]]:
+def _moments(fit: Solution) -> tuple[Float[np.ndarray, " z"], Float[np.ndarray, " z"]]:
     """Mean and standard deviation of each state and signal, over all samples."""
     count, mean, squares = 0, np.zeros(()), np.zeros(())
     for index in range(len(fit.model)):

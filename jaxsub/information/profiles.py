@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..errors import InputError, nearest
-from ..estimate import Fit, Problem, gauss_newton
+from ..estimate import Problem, Solution, gauss_newton
 from ..estimate.method import costs, holding, lanes_for, objective
 from ..estimate.pool import pool
 from ..results import RESULTS
@@ -38,7 +38,7 @@ class Profile:
     interval: tuple[float, float]
 
 
-def profile(fit: Fit, names: Sequence[str], *, points: int = 13, width: float = 3.0) -> list[Profile]:
+def profile(fit: Solution, names: Sequence[str], *, points: int = 13, width: float = 3.0) -> list[Profile]:
     """Profiles of the coefficients `names` at `points` values within `width` standard errors of the fit.
 
     Where a standard error exceeds the coefficient's own size, the grid goes by that size. All points of all profiles
@@ -72,7 +72,7 @@ def profile(fit: Fit, names: Sequence[str], *, points: int = 13, width: float = 
     return [Profile(n, v, r, _interval(v, r, fit.values[n])) for n, v, r in zip(names, values, rise, strict=True)]
 
 
-def _coordinates(fit: Fit, problem: Problem, theta: np.ndarray) -> Float[Array, "g d"]:
+def _coordinates(fit: Solution, problem: Problem, theta: np.ndarray) -> Float[Array, "g d"]:
     """Coordinates of the coefficients `theta` (g, p) and the fitted initial states."""
     # initial states that are known have no spread, and no coordinates
     moved = (fit.start - problem.guess) / jnp.where(problem.spread > 0.0, problem.spread, 1.0)

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..estimate import Assessment, Fit, assess
+from ..estimate import Assessment, Solution, assess
 from ..likelihood import Watch, nobody
 from .directions import FRACTION, Directions, subset
 from .equivalence import Family, equivalent_systems
@@ -95,7 +95,7 @@ class Identifiability:
         return lines + own + of_all
 
 
-def identifiability(fit: Fit, assessment: Assessment | None = None, watch: Watch = nobody) -> Identifiability:
+def identifiability(fit: Solution, assessment: Assessment | None = None, watch: Watch = nobody) -> Identifiability:
     """The directions that a fit's recordings leave open, and a verdict on each coefficient.
 
     `assessment` says whether the fit explains its runs; it is made of the fit where none is given.
@@ -119,7 +119,7 @@ def identifiability(fit: Fit, assessment: Assessment | None = None, watch: Watch
     return Identifiability(p - len(open_), p, null, directions.uncertainty.tolist(), verdicts, families)
 
 
-def identifiable_subset(fit: Fit) -> tuple[str, ...]:
+def identifiable_subset(fit: Solution) -> tuple[str, ...]:
     """Free coefficients to hold at their file values so that the rest is identified; added mass is held first."""
     if not fit.names:
         return ()
@@ -129,7 +129,7 @@ def identifiable_subset(fit: Fit) -> tuple[str, ...]:
     return subset(Directions.of(fit), tuple(name for name in fit.names if moves(name)))
 
 
-def _verdicts(fit: Fit, directions: Directions, families: tuple[Family, ...]) -> tuple[Verdict, ...]:
+def _verdicts(fit: Solution, directions: Directions, families: tuple[Family, ...]) -> tuple[Verdict, ...]:
     pressed = tuple(i for i, name in enumerate(fit.names) if name in fit.at_bound)
     errors, alone = directions.relative_errors(pressed), directions.alone()
     if not (errors > FRACTION).any():
@@ -157,7 +157,7 @@ def _verdicts(fit: Fit, directions: Directions, families: tuple[Family, ...]) ->
     return tuple(made)
 
 
-def _withheld(verdict: Verdict, fit: Fit, assessment: Assessment) -> Verdict:
+def _withheld(verdict: Verdict, fit: Solution, assessment: Assessment) -> Verdict:
     """The verdict, unless the coefficient presses on a bound, or the fit is none that one could count on."""
     if verdict.name in fit.at_bound:
         kind: Kind = "at its lower bound" if fit.at_bound[verdict.name] == "lower" else "at its upper bound"

@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from ..discrepancy.diagnosis import Candidate, Coefficient, Diagnosis
+from ..discrepancy.diagnosis import Candidate, Coefficient, Conclusions
 from .drawing import GREY, IMPROVED, LOCATED, PALE, Picture, drawable, new_figure, png
 from .text import number, power_of_ten
 
@@ -16,12 +16,12 @@ _MOST_COEFFICIENTS = 20
 _WIDTH = 4.9
 
 
-def top_candidates(diagnosis: Diagnosis) -> list[Candidate]:
+def top_candidates(diagnosis: Conclusions) -> list[Candidate]:
     """The strongest lines of the scan, strongest first."""
     return sorted(diagnosis.candidates, key=lambda candidate: -candidate.statistic)[:MOST_CANDIDATES]
 
 
-def draw_scan(diagnosis: Diagnosis) -> Picture | None:
+def draw_scan(diagnosis: Conclusions) -> Picture | None:
     """χ² of the strongest candidates on a logarithmic axis, or None when nothing was scanned."""
     candidates = top_candidates(diagnosis)
     if not candidates:
@@ -47,7 +47,7 @@ def draw_scan(diagnosis: Diagnosis) -> Picture | None:
     return Picture("scan", "Bars: the chi-square of the strongest candidates of the score scan", png(figure))
 
 
-def moved_coefficients(diagnosis: Diagnosis) -> list[tuple[Coefficient, float, float]]:
+def moved_coefficients(diagnosis: Conclusions) -> list[tuple[Coefficient, float, float]]:
     """Coefficient, its change and its new standard error, both in units of the baseline's standard error."""
     moved = []
     for coefficient in diagnosis.coefficients:
@@ -59,7 +59,7 @@ def moved_coefficients(diagnosis: Diagnosis) -> list[tuple[Coefficient, float, f
     return sorted(moved, key=lambda row: -abs(row[1]))[:_MOST_COEFFICIENTS]
 
 
-def draw_coefficients(diagnosis: Diagnosis) -> Picture | None:
+def draw_coefficients(diagnosis: Conclusions) -> Picture | None:
     """How far each coefficient moved when the effects were added, or None when nothing was."""
     moved = moved_coefficients(diagnosis) if diagnosis.improves else []
     if not moved:

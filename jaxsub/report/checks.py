@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..discrepancy.diagnosis import Diagnosis, Remainder
+from ..discrepancy.diagnosis import Conclusions, Remainder
 from .drawing import (
     BASELINE,
     GREY,
@@ -28,7 +28,7 @@ _COLORS = {"baseline": BASELINE, "improved": IMPROVED}
 Models = dict[str, Remainder]
 
 
-def draw_checks(diagnosis: Diagnosis) -> Picture | None:
+def draw_checks(diagnosis: Conclusions) -> Picture | None:
     """Correlations of the simulation errors of test runs, of the channels that `draw_overlay` shows; None without."""
     overlay = telling_overlay(diagnosis)
     names = affected_channels(diagnosis, overlay) if overlay else []

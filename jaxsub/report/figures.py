@@ -1,6 +1,6 @@
 """All figures of a report."""
 
-from ..discrepancy.diagnosis import Diagnosis
+from ..discrepancy.diagnosis import Conclusions
 from .bars import draw_coefficients, draw_scan
 from .checks import draw_checks
 from .drawing import Picture, style
@@ -10,7 +10,7 @@ from .overlay import draw_overlay
 _FIGURES = (draw_forces, draw_scan, draw_overlay, draw_checks, draw_coefficients)
 
 
-def draw(diagnosis: Diagnosis) -> dict[str, Picture]:
+def draw(diagnosis: Conclusions) -> dict[str, Picture]:
     """The figures that the diagnosis has data for, by name: `forces`, `scan`, `before-after`, `checks`,
     `coefficients`."""
     with style():

@@ -8,7 +8,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..discrepancy.diagnosis import Diagnosis, ForceTrace, Location
+from ..discrepancy.diagnosis import Conclusions, ForceTrace, Location
 from ..effects import FORCE_UNITS
 from .drawing import (
     BASELINE,
@@ -39,7 +39,7 @@ def is_equation(place: Location) -> bool:
     return ":" not in place.where
 
 
-def telling_trace(diagnosis: Diagnosis) -> ForceTrace | None:
+def telling_trace(diagnosis: Conclusions) -> ForceTrace | None:
     """The run whose missing force stands out most, in the located equations or, without any, in all."""
     located = {place.where for place in diagnosis.where}
 
@@ -50,7 +50,7 @@ def telling_trace(diagnosis: Diagnosis) -> ForceTrace | None:
     return max((trace for trace in diagnosis.forces if trace.force), key=prominence, default=None)
 
 
-def draw_forces(diagnosis: Diagnosis) -> Picture | None:
+def draw_forces(diagnosis: Conclusions) -> Picture | None:
     """The figure for the most telling run, or None when there is no trace."""
     trace = telling_trace(diagnosis)
     if trace is None:

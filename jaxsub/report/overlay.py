@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Overlay
+from ..discrepancy.diagnosis import ChannelQuality, Conclusions, Overlay
 from .drawing import (
     BASELINE,
     GREY,
@@ -27,7 +27,7 @@ from .text import symbol, unit
 _MOST_CHANNELS = 4
 
 
-def affected_channels(diagnosis: Diagnosis, overlay: Overlay) -> list[str]:
+def affected_channels(diagnosis: Conclusions, overlay: Overlay) -> list[str]:
     """The channels of `overlay` that gained most by an improved model, else those that are worst modelled."""
     fit = diagnosis.fit.get("held_out", {})
     baseline, improved = fit.get("baseline", {}), fit.get("improved", {}) if diagnosis.improves else {}
@@ -35,7 +35,7 @@ def affected_channels(diagnosis: Diagnosis, overlay: Overlay) -> list[str]:
     return sorted(gain, key=lambda name: -gain[name])[:_MOST_CHANNELS]
 
 
-def telling_overlay(diagnosis: Diagnosis) -> Overlay | None:
+def telling_overlay(diagnosis: Conclusions) -> Overlay | None:
     """The run in which the baseline misses most."""
     sigma = lambda channel: diagnosis.quality[channel].sigma if channel in diagnosis.quality else 1.0
 
@@ -45,7 +45,7 @@ def telling_overlay(diagnosis: Diagnosis) -> Overlay | None:
     return max((overlay for overlay in diagnosis.overlays if overlay.measured), key=miss, default=None)
 
 
-def draw_overlay(diagnosis: Diagnosis) -> Picture | None:
+def draw_overlay(diagnosis: Conclusions) -> Picture | None:
     """The figure for the most telling unseen run, or None when there is none."""
     overlay = telling_overlay(diagnosis)
     if overlay is None:

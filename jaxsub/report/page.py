@@ -8,7 +8,7 @@ import jinja2
 from markupsafe import Markup
 
 from ..discrepancy.decisions import decision_rows
-from ..discrepancy.diagnosis import Diagnosis
+from ..discrepancy.diagnosis import Conclusions
 from . import tables, text
 from .bars import top_candidates
 from .drawing import Picture
@@ -31,7 +31,7 @@ _KINDS = {
 }
 
 
-def write_report(diagnosis: Diagnosis, vehicle_text: str, folder: Path) -> None:
+def write_report(diagnosis: Conclusions, vehicle_text: str, folder: Path) -> None:
     """Write `report.html`, which needs no other file, and `figures/*.png` into `folder`.
 
     `vehicle_text` is the improved vehicle file, of which the page shows the effects. Existing files are replaced.
@@ -44,7 +44,7 @@ def write_report(diagnosis: Diagnosis, vehicle_text: str, folder: Path) -> None:
     (folder / "report.html").write_text(render(diagnosis, vehicle_text, pictures), encoding="utf-8")
 
 
-def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]) -> str:
+def render(diagnosis: Conclusions, vehicle_text: str, pictures: dict[str, Picture]) -> str:
     """The page as text, with `pictures` inlined."""
     context: dict[str, Any] = {
         "diagnosis": diagnosis,
@@ -66,11 +66,11 @@ def render(diagnosis: Diagnosis, vehicle_text: str, pictures: dict[str, Picture]
     return _environment().get_template("template.html.j2").render(context)
 
 
-def _added(diagnosis: Diagnosis, vehicle_text: str) -> str:
+def _added(diagnosis: Conclusions, vehicle_text: str) -> str:
     return tables.effects_text(vehicle_text, {coefficient.name for coefficient in diagnosis.coefficients})
 
 
-def _key_numbers(diagnosis: Diagnosis) -> list[tables.KeyNumber]:
+def _key_numbers(diagnosis: Conclusions) -> list[tables.KeyNumber]:
     mismatch = tables.KeyNumber(text.p_value(diagnosis.p_value), "p-value of the mismatch", "corrected for all tried")
     numbers = [mismatch, tables.gain_number(diagnosis), tables.run_number(diagnosis)]
     return [number for number in numbers if number is not None]

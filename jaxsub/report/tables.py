@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping, Sequence
 import tomlkit
 from markupsafe import Markup
 
-from ..discrepancy.diagnosis import ChannelQuality, Diagnosis, Location, Regime, Remainder
+from ..discrepancy.diagnosis import ChannelQuality, Conclusions, Location, Regime, Remainder
 from ..discrepancy.settings import RESIDUAL_LEVEL
 from ..findings import Finding
 from .text import UNKNOWN, formula, number, p_value, ratio, symbol, unit
@@ -73,14 +73,14 @@ class ChannelRow:
     flagged: bool
 
 
-def fit_columns(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+def fit_columns(diagnosis: Conclusions) -> list[tuple[str, str]]:
     """The (set, model) pairs that are worth showing: no improved model where there is none."""
     models = ["baseline", "improved"] if diagnosis.improves else ["baseline"]
     pairs = itertools.product(("train", "held_out"), models)
     return [(runs, model) for runs, model in pairs if diagnosis.fit.get(runs, {}).get(model)]
 
 
-def fit_rows(diagnosis: Diagnosis) -> list[FitRow]:
+def fit_rows(diagnosis: Conclusions) -> list[FitRow]:
     """One row for each channel that any column has."""
     columns = [diagnosis.fit[runs][model] for runs, model in fit_columns(diagnosis)]
     channels = dict.fromkeys(channel for column in columns for channel in column)
@@ -89,7 +89,7 @@ def fit_rows(diagnosis: Diagnosis) -> list[FitRow]:
     return [FitRow(channel, cells(channel)) for channel in channels]
 
 
-def check_rows(diagnosis: Diagnosis) -> list[CheckRow]:
+def check_rows(diagnosis: Conclusions) -> list[CheckRow]:
     """One row for each channel whose residuals on the test runs were tested."""
     models = list(diagnosis.remains.values())
     channels = models[0] if models else {}
@@ -97,7 +97,7 @@ def check_rows(diagnosis: Diagnosis) -> list[CheckRow]:
     return [CheckRow(name, [test(left[name]) for test in tests for left in models]) for name in channels]
 
 
-def channel_rows(diagnosis: Diagnosis) -> list[ChannelRow]:
+def channel_rows(diagnosis: Conclusions) -> list[ChannelRow]:
     """Each channel with its recorded noise over the one used."""
     rows = []
     for quality in diagnosis.channels:
@@ -113,7 +113,7 @@ def finding_rows(findings: Sequence[Finding]) -> list[Finding]:
     return sorted(findings, key=lambda finding: order.index(finding.severity))
 
 
-def gain_number(diagnosis: Diagnosis) -> KeyNumber | None:
+def gain_number(diagnosis: Conclusions) -> KeyNumber | None:
     """The unseen channel that gained most, or without an improved model the one that is worst; None without any.
 
     Over the noise that is stated for it, or in its unit where none is.
@@ -134,7 +134,7 @@ def gain_number(diagnosis: Diagnosis) -> KeyNumber | None:
     return KeyNumber(_size(values, quality), f"rms error of {symbol(chosen)}, unseen runs", which)
 
 
-def run_number(diagnosis: Diagnosis) -> KeyNumber:
+def run_number(diagnosis: Conclusions) -> KeyNumber:
     """How many runs there are and how they were used."""
     held_out = sum(run.role != "train" for run in diagnosis.runs)
     minutes = sum(run.duration for run in diagnosis.runs) / 60.0

@@ -36,7 +36,7 @@ from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
 from jaxsub.effects.mechanisms import CoulombFriction
 from jaxsub.effects.sensors import SensorScale
-from jaxsub.estimate import Ended, Problem, batch, evaluate, fit
+from jaxsub.estimate import Problem, SearchEnd, batch, evaluate, fit
 from jaxsub.results import RESULTS
 from jaxsub.vehicle import read_vehicle
 from jaxsub.vehicle.catalogue import dsrv
@@ -71,7 +71,7 @@ def astray(runs, share, *names):
     sigma = jnp.array([output.sigma for output in wrong().layout.outputs])
     start = Problem.of(wrong(), runs, sigma).guess
     gone = wrong().with_values({name: share * values[name] for name in names})
-    return evaluate(Ended(gone, runs, start, sigma, jnp.asarray(1e6), jnp.asarray(0), RESULTS.successful))
+    return evaluate(SearchEnd(gone, runs, start, sigma, jnp.asarray(1e6), jnp.asarray(0), RESULTS.successful))
 
 
 @pytest.mark.long

@@ -22,7 +22,7 @@ from jaxsub.discrepancy.view import led_from
 from jaxsub.effects import CubicStiffness, numbers
 from jaxsub.effects.actuator_curves import ActuatorDeadband
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping
-from jaxsub.estimate import Ended, Problem, batch, initial_guess
+from jaxsub.estimate import Problem, SearchEnd, batch, initial_guess
 from jaxsub.likelihood import Disturbance, whitened
 from jaxsub.recording import Recording
 from jaxsub.results import RESULTS
@@ -147,7 +147,7 @@ def begun():
     file = pendulum(D_x=0.35, K_x=-0.85, B_x_drive=1.8)
     view = led_from(file, train, SIGMA, [dataclasses.replace(STILL, force=jnp.array([1.0]))])
     start, cost = initial_guess(view.vehicle, train)[0], jnp.asarray(-evidence_of(view))
-    fit = Ended(view.vehicle, train, start, SIGMA, cost, jnp.asarray(0), RESULTS.nan_start)
+    fit = SearchEnd(view.vehicle, train, start, SIGMA, cost, jnp.asarray(0), RESULTS.nan_start)
     lost = Predicted(one_step_ahead(view), np.full(2 * BLOCKS, -np.inf))
     return ModelFitter(lambda message: None, file), Model(fit, view, lost, ())
 

@@ -9,7 +9,7 @@ import pytest
 
 from jaxsub.discrepancy.regime import regime, regime_variables
 from jaxsub.discrepancy.show import trades
-from jaxsub.estimate import Fit
+from jaxsub.estimate import Solution
 from jaxsub.vehicle.catalogue import nps_auv_ii
 
 RUNS, SAMPLES, DEAD = 3, 600, 40
@@ -88,7 +88,7 @@ def test_an_effect_trades_with_what_its_numbers_go_with():
     root = np.array([[1.0, 0.0, 0.0, 0.0], [0.99, 0.14, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [-0.93, 0.0, 0.0, 0.37]])
     scale = np.array([1e3, 1e-2, 1.0, 5.0])
     covariance = (root @ root.T) * scale * scale[:, None]
-    fit = object.__new__(Fit)
+    fit = object.__new__(Solution)
     rows = [SimpleNamespace(name=name) for name in ("drag.C", "drag.D", "Y_r", "Y_v")]
     object.__setattr__(fit, "vehicle", SimpleNamespace(layout=SimpleNamespace(free=rows)))
     object.__setattr__(fit, "covariance", jnp.asarray(covariance))

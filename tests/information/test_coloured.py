@@ -13,7 +13,7 @@ import pytest
 import scipy.optimize
 from rigs import driven, oscillator, stacked
 
-from jaxsub.estimate import Ended, estimate_disturbance, evaluate
+from jaxsub.estimate import SearchEnd, estimate_disturbance, evaluate
 from jaxsub.information import coloured_covariance
 from jaxsub.likelihood import (
     Columns,
@@ -42,7 +42,7 @@ def exact():
     mask = np.random.default_rng(5).random(runs.mask.shape) > 0.1
     runs = dataclasses.replace(runs, mask=runs.mask & mask, outputs=jnp.where(mask, runs.outputs, 0.0))
     nothing = jnp.asarray(0.0), jnp.asarray(0), RESULTS.successful
-    return evaluate(Ended(vehicle, runs, jnp.zeros((RUNS, 2)), jnp.asarray(SIGMA), *nothing))
+    return evaluate(SearchEnd(vehicle, runs, jnp.zeros((RUNS, 2)), jnp.asarray(SIGMA), *nothing))
 
 
 def gauss_markov(rng, count, size, time):
@@ -218,7 +218,7 @@ def test_coefficient_that_nothing_tells_keeps_an_error_without_bound_and_spoils_
     rows = exact.runs.signals * 0.0
     runs = dataclasses.replace(exact.runs, signals=rows)
     told = exact.cost, exact.steps, exact.result
-    still = evaluate(Ended(exact.vehicle, runs, jnp.full((RUNS, 2), 0.3), exact.sigma, *told))
+    still = evaluate(SearchEnd(exact.vehicle, runs, jnp.full((RUNS, 2), 0.3), exact.sigma, *told))
     found = coloured_covariance(still).standard_errors
     assert found["B_x_drive"] > 1e3
     assert 0.0 < found["K_x"] < 4.0

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from rigs import driven, oscillator, stacked
 
-from jaxsub.estimate import Ended, evaluate
+from jaxsub.estimate import SearchEnd, evaluate
 from jaxsub.information import coloured_covariance
 from jaxsub.results import RESULTS
 from jaxsub.simulation import synthetic
@@ -30,7 +30,7 @@ def ratios(size, time, seed):
     runs = stacked(vehicle, synthetic(truth, [recording], seed=seed))
     sigma = jnp.asarray([output.sigma for output in vehicle.layout.outputs])
     nothing = jnp.asarray(0.0), jnp.asarray(0), RESULTS.successful
-    found = evaluate(Ended(vehicle, runs, jnp.zeros((1, 2)), sigma, *nothing))
+    found = evaluate(SearchEnd(vehicle, runs, jnp.zeros((1, 2)), sigma, *nothing))
     coloured = coloured_covariance(found)
     return np.sqrt(np.diag(coloured.covariance) / np.diag(found.covariance)), coloured.disturbance
 

@@ -8,7 +8,7 @@ import pytest
 from lateral import lateral
 from rigs import driven, oscillator, stacked
 
-from jaxsub.estimate import Ended, evaluate
+from jaxsub.estimate import SearchEnd, evaluate
 from jaxsub.information import identifiability, identifiable_subset
 from jaxsub.results import RESULTS
 from jaxsub.simulation import synthetic
@@ -25,7 +25,7 @@ def at_truth(vehicle, noisier=1.0, still=()):
     layout = vehicle.layout
     start = jnp.zeros((2, len(layout.equations) + len(layout.positions)))
     sigma = noisier * jnp.array([output.sigma for output in layout.outputs])
-    return evaluate(Ended(vehicle, runs, start, sigma, jnp.asarray(0.0), jnp.asarray(0), RESULTS.successful))
+    return evaluate(SearchEnd(vehicle, runs, start, sigma, jnp.asarray(0.0), jnp.asarray(0), RESULTS.successful))
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from jaxsub.discrepancy.diagnosis import (
     Candidate,
     ChannelQuality,
     Coefficient,
-    Diagnosis,
+    Conclusions,
     Estimate,
     Explained,
     Gain,
@@ -50,14 +50,14 @@ FINDINGS = (
 )  # fmt: skip
 
 
-def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, described: bool = False) -> Diagnosis:
+def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, described: bool = False) -> Conclusions:
     """A diagnosis with two fitted runs and a held-out one; `described` says that effects without a name stand in."""
     make = np.random.default_rng(seed)
     accepted = verdict in ("named", "ambiguous")
     found = accepted or described
     missing = verdict != "none"
     fit, models = _fit(missing, found), ("baseline", "improved")[: 1 + found]
-    return Diagnosis(
+    return Conclusions(
         verdict=verdict,
         vehicle="NPS AUV II",
         summary=_SUMMARIES[verdict],
@@ -92,10 +92,10 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
     )  # fmt: skip
 
 
-def bare(verdict: str = "none") -> Diagnosis:
+def bare(verdict: str = "none") -> Conclusions:
     """The least that a diagnosis can hold."""
-    empty = {field.name: [] for field in dataclasses.fields(Diagnosis) if str(field.type).startswith("list")}
-    return Diagnosis(verdict=verdict, vehicle="rig", summary="-", p_value=1.0, fit={}, next_manoeuvre=None, **empty)
+    empty = {field.name: [] for field in dataclasses.fields(Conclusions) if str(field.type).startswith("list")}
+    return Conclusions(verdict=verdict, vehicle="rig", summary="-", p_value=1.0, fit={}, next_manoeuvre=None, **empty)
 
 
 _NEXT = "A turning circle at 20° rudder and half the speed: the drag would fall fourfold, the lift only twofold."
