@@ -5,7 +5,7 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from jaxsub.cli.diagnose import diagnosed
+from jaxsub.cli.diagnose import answered, emit
 from jaxsub.discrepancy import Conclusions
 from jaxsub.discrepancy.diagnosis import Estimate
 from jaxsub.vehicle import read_vehicle
@@ -24,9 +24,9 @@ def diagnose_case(case: Case, folder: Path) -> tuple[Conclusions, dict]:
     (folder / "vehicle.toml").write_text(case.vehicle, encoding="utf-8")
     shutil.rmtree(folder / "figures", ignore_errors=True)
     begin = time.perf_counter()
-    answer = diagnosed(read_vehicle(folder / "vehicle.toml"), case.train, case.held)
-    diagnosis = answer.diagnosis
-    answer.emit()
+    answer = answered(read_vehicle(folder / "vehicle.toml"), case.train, case.held)
+    diagnosis = answer.conclusions
+    emit(answer)
     answer.write(folder)
     seconds = time.perf_counter() - begin
     draw_held_out(diagnosis, case, folder / "held_out.png")

@@ -16,7 +16,7 @@ from ..simulation.manoeuvres import prbs
 from ..vehicle import AbstractVehicle, read_vehicle, write_vehicle
 from ..vehicle.catalogue import nps_auv_ii
 from . import session, terminal
-from .diagnose import diagnosed
+from .diagnose import answered, emit
 from .output import fresh_folder
 from .runs import load_runs
 
@@ -47,8 +47,8 @@ def run(out: Path, seed: int, overwrite: bool) -> None:
         concealed = make_files(folder, seed)
         vehicle = read_vehicle(folder / "vehicle.toml")
         runs = load_runs(sorted(folder.glob("run*.csv")), vehicle)
-        answer = diagnosed(vehicle, runs[:-1], runs[-1:])
-        answer.emit()
+        answer = answered(vehicle, runs[:-1], runs[-1:])
+        emit(answer)
         answer.write(folder)
     terminal.note(f"report: {out / 'report.html'}")
     if concealed is not None:

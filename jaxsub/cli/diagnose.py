@@ -1,32 +1,22 @@
 """`jaxsub diagnose`: the whole path."""
 
-import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from rich.panel import Panel
 from rich.text import Text
 
-from ..discrepancy import Conclusions
-from ..discrepancy import diagnose as diagnose_runs
-from ..discrepancy.decisions import decision_rows
-from ..discrepancy.next_run import next_run, said
-from ..discrepancy.procedure import Keep
+from ..api.diagnoses import Diagnosis, diagnosed
 from ..effects import AbstractEffect, from_script, vocabulary
 from ..errors import InputError, OutputError
 from ..estimate import require_free
-from ..plain import to_json
-from ..recording import Recording, hold_out, save
-from ..report import write_report
-from ..report.text import measurement, percent, ratio, unit
-from ..vehicle import AbstractVehicle, added_effects, read_vehicle, vehicle_text, with_coefficients
+from ..recording import Recording, hold_out
+from ..vehicle import AbstractVehicle, added_effects, read_vehicle
 from . import session, terminal
 from .options import options
 from .output import Fresh, fresh_folders, paths_of
 from .runs import load_train_and_test
-
-_NEXT = "next_manoeuvre.csv"
 
 
 def run(
@@ -57,14 +47,14 @@ def run(
         first = () if begin is None else added(vehicle, begin, (*vocabulary(), *own))
         recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
         train, test = (recordings, unseen) if held else hold_out(recordings)
-        keep = lambda diagnosis, improved: _keep(Answer(diagnosis, improved, None), fresh, out)
-        answer = diagnosed(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget, keep, first)
+        keep = lambda found: _keep(found, fresh, out)
+        answer = answered(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget, keep, first)
         # shown before it is written: where writing fails, minutes of work are not lost
-        answer.emit(explain)
+        emit(answer, explain)
         with fresh() as folder:
             answer.write(folder)
     terminal.note(f"report: {out / 'report.html'}")
-    if not answer.diagnosis.complete and (watch := options().watch) is not None and watch.interrupted:
+    if not answer.complete and (watch := options().watch) is not None and watch.interrupted:
         options().kept = _held(answer, out)
         raise KeyboardInterrupt
 
@@ -78,7 +68,7 @@ def added(vehicle: AbstractVehicle, improved: Path, kinds: tuple[type[AbstractEf
     return found
 
 
-def _keep(answer: "Answer", fresh: Fresh, out: Path) -> None:
+def _keep(answer: Diagnosis, fresh: Fresh, out: Path) -> None:
     """Put an answer on the way at `out`. Where it cannot be written, the command says so with the last one."""
     with suppress(OutputError):
         with fresh() as folder:
@@ -86,113 +76,54 @@ def _keep(answer: "Answer", fresh: Fresh, out: Path) -> None:
         options().kept = _held(answer, out)
 
 
-def _held(answer: "Answer", out: Path) -> str:
-    return f"{out} holds the answer{'' if answer.diagnosis.complete else ' so far, which is incomplete'}"
+def _held(answer: Diagnosis, out: Path) -> str:
+    return f"{out} holds the answer{'' if answer.complete else ' so far, which is incomplete'}"
 
 
-@dataclasses.dataclass(frozen=True)
-class Answer:
-    """A diagnosis, the improved vehicle, and the inputs of the run that would tell rivals apart, if there are any."""
-
-    diagnosis: Conclusions
-    improved: AbstractVehicle
-    next_run: Recording | None
-
-    def emit(self, explain: bool = False) -> None:
-        """Print the verdict, or with `--json` what `diagnosis.json` holds, on standard output."""
-        terminal.emit(self.diagnosis.to_json(), lambda: show(self.diagnosis, explain))
-
-    def write(self, folder: Path) -> None:
-        """Write `diagnosis.json`, `improved.toml`, `report.html`, `figures/` and `next_manoeuvre.csv` into `folder`."""
-        text = self.write_numbers(folder)
-        if self.next_run is not None:
-            save(self.next_run, folder / _NEXT)
-        write_report(self.diagnosis, text, folder)
-
-    def write_numbers(self, folder: Path) -> str:
-        """Write `diagnosis.json` and `improved.toml` alone; returns the latter's text."""
-        diagnosis = self.diagnosis
-        improved = with_coefficients(self.improved)
-        text = vehicle_text(improved, f"{diagnosis.vehicle}, improved by jaxsub\n{diagnosis.summary}")
-        (folder / "improved.toml").write_text(text, encoding="utf-8")
-        (folder / "diagnosis.json").write_text(to_json(diagnosis.to_json()), encoding="utf-8")
-        return text
-
-
-def diagnosed(
+def answered(
     vehicle: AbstractVehicle,
     train: Sequence[Recording],
     test: Sequence[Recording],
     kinds: tuple[type[AbstractEffect], ...] | None = None,
     manoeuvre: bool = True,
     budget: float | None = None,
-    keep: Keep = lambda diagnosis, improved: None,
+    keep: Callable[[Diagnosis], object] = lambda found: None,
     begin: Sequence[AbstractEffect] = (),
-) -> Answer:
-    """Diagnose `vehicle` by the runs `train`, shown on `test`, trying effects of `kinds`: all installed where None.
+) -> Diagnosis:
+    """The diagnosis by checked runs with its progress shown, and a first interruption heeded once there is an answer.
 
-    Where rivals remain and a `manoeuvre` is wanted, inputs that would tell them apart are looked for. After `budget`
-    seconds, or once interrupted, no further effect is tried. Each answer on the way is given to `keep`. Effects to
-    `begin` with come before any other.
+    Arguments are as of `api.diagnoses.diagnosed`; where rivals remain and a `manoeuvre` is wanted, it is looked for.
     """
     watch = options().watch
     with terminal.progress(f"diagnosing {vehicle.layout.name}") as told, ExitStack() as kept:
 
-        def keep_and_heed(diagnosis: Conclusions, improved: AbstractVehicle) -> None:
-            keep(diagnosis, improved)
+        def keep_and_heed(found: Diagnosis) -> None:
+            keep(found)
             # before there is an answer an interruption ends all at once
             if watch is not None:
                 kept.enter_context(watch.heeded())
 
         stop = lambda: watch is not None and watch.interrupted
-        diagnosis, improved = diagnose_runs(
-            vehicle,
-            train,
-            test,
-            vocabulary=kinds,
-            progress=told,
-            budget=budget,
-            stop=stop,
-            keep=keep_and_heed,
-            begin=begin,
+        found = diagnosed(
+            vehicle, train, test, kinds, budget=budget, progress=told, stop=stop, keep=keep_and_heed, begin=begin
         )
         kept.close()
-        if not (manoeuvre and diagnosis.explanations and diagnosis.complete):
-            return Answer(diagnosis, improved, None)
-        keep(diagnosis, improved)
-        told("looking for the manoeuvre that would settle it")
-        found = next_run(diagnosis, train)
-        if found is None:
-            return Answer(diagnosis, improved, None)
-        advice = f"{diagnosis.next_manoeuvre}. {said(found, _NEXT)}"
-        return Answer(dataclasses.replace(diagnosis, next_manoeuvre=advice), improved, found.recording)
+        if not (manoeuvre and found.undecided):
+            return found
+        keep(found)
+        return found.with_next_run(train, told)
 
 
-def show(diagnosis: Conclusions, explain: bool = False) -> None:
+def emit(answer: Diagnosis, explain: bool = False) -> None:
+    """Print the verdict, or with `--json` what `diagnosis.json` holds, on standard output."""
+    terminal.emit(answer.conclusions.to_json(), lambda: show(answer, explain))
+
+
+def show(answer: Diagnosis, explain: bool = False) -> None:
     """The verdict, the effects that were named, and the errors on the test runs, on standard output.
 
     `explain` adds a row for every decision, in order.
     """
-    terminal.results.print(
-        Panel(
-            Text(diagnosis.summary),
-            title=diagnosis.verdict + ("" if diagnosis.complete else " (incomplete)"),
-            expand=False,
-        )
-    )
-    parameters = [
-        (found.label, symbol, measurement(one.value, one.standard_error), unit(one.unit), percent(found.probability))
-        for found in diagnosis.physics
-        for symbol, one in found.parameters.items()
-    ]
-    if parameters:
-        terminal.table(("effect", "parameter", "value", "unit", "probability of the effect"), parameters)
-    before, after = (diagnosis.fit.get("held_out", {}).get(model, {}) for model in ("baseline", "improved"))
-    if diagnosis.improves:
-        rows = [(name, ratio(value), ratio(after.get(name))) for name, value in before.items()]
-        terminal.table(("test run: channel", "rms/σ of the baseline", "of the improved model"), rows)
-    elif before:
-        rows = [(name, ratio(value)) for name, value in before.items()]
-        terminal.table(("test run: channel", "rms/σ"), rows)
-    if explain:
-        terminal.table(("candidate", "test", "statistic", "threshold", "outcome"), decision_rows(diagnosis.decisions))
+    title = answer.verdict + ("" if answer.complete else " (incomplete)")
+    terminal.results.print(Panel(Text(answer.sentence), title=title, expand=False))
+    terminal.show([*answer.tables(), *([answer.decisions()] if explain else [])])

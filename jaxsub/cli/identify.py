@@ -1,22 +1,17 @@
 """`jaxsub identify`: coefficients with standard errors, whether they explain the runs, and what the runs leave open."""
 
-import dataclasses
 import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ..errors import InputError, OutputError
-from ..estimate import METHODS, Passes, Solution, assess, batch, fit, posterior, require_free
-from ..information import coloured_covariance, identifiability
-from ..recording.runs import Runs
-from ..vehicle import AbstractVehicle, read_vehicle
+from ..api.fits import Fit, fitted
+from ..errors import OutputError
+from ..estimate import Passes, batch, posterior, require_free
+from ..vehicle import read_vehicle
 from . import session, terminal
 from .effort import Effort, TimeLeft, return_memory
-from .identification import Identification
 from .interruption import interruptible
 from .options import options
 from .output import Fresh, fresh_folders, paths_of
@@ -53,29 +48,29 @@ def run(
             terminal.note(announcement)
         with terminal.progress(f"identifying {vehicle.layout.name}") as told:
             told(f"fitting by {method}")
-            found = _fitted(vehicle, stacked, method, str(vehicle_path), TimeLeft(told, f"fitting by {method}"))
-            fitted = Identification(found, method, ", ".join(map(str, runs)), assess(found), None, None, False)
-            _keep(fitted, fresh, out)
+            left = TimeLeft(told, f"fitting by {method}")
+            found = fitted(vehicle, stacked, list(map(str, runs)), method, file=str(vehicle_path), passes=left)
+            _keep(found, fresh, out)
             told(_FOLLOWS)
-            identified = _followed(fitted, TimeLeft(told, _FOLLOWS))
-        terminal.emit(identified.to_json(), lambda: _show(identified))
-        terminal.warn(identified.findings)
+            identified = _followed(found, TimeLeft(told, _FOLLOWS))
+        terminal.emit(identified.to_json(), lambda: terminal.show(identified.told()))
+        terminal.warn(identified.warnings)
         with fresh() as folder:
             identified.write(folder)
             if drawn and identified.complete:
                 with terminal.progress(f"identifying {vehicle.layout.name}") as told:
                     told("drawing from the posterior")
-                    _write_posterior(posterior(found), folder / "posterior.nc")
+                    _write_posterior(posterior(found.solution), folder / "posterior.nc")
     if not identified.complete:
         options().kept = f"{out} holds the fit, and what followed it so far"
         raise KeyboardInterrupt
 
 
-def _keep(fitted: Identification, fresh: Fresh, out: Path) -> None:
+def _keep(found: Fit, fresh: Fresh, out: Path) -> None:
     """Put the fit at `out`. Where it cannot be written, the command ends only once the verdict has been shown."""
     with suppress(OutputError):
         with fresh() as folder:
-            fitted.write(folder)
+            found.write(folder)
         options().kept = f"{out} holds the fit"
 
 
@@ -86,34 +81,10 @@ def _write_posterior(drawn: Any, path: Path) -> None:
         path.write_bytes((Path(folder) / path.name).read_bytes())
 
 
-def _fitted(vehicle: AbstractVehicle, runs: Runs, method: str, where: str, passes: Passes) -> Solution:
-    """The fit of the vehicle, read from `where`. **Raises** `InputError` where the model does not run."""
-    # Gauss–Newton by its own name is what `fit` does unasked, and that finds a start where the file's does not run
-    chosen = None if method == "gauss-newton" else METHODS[method.replace("-", "_")]()
-    found = fit(vehicle, runs, method=chosen, passes=passes)
-    if not np.isfinite(float(found.cost)):
-        what = "the model does not run from these values"
-        raise InputError(where, what, "give values that are closer, or another --method")
-    return found
-
-
-def _followed(fitted: Identification, passes: Passes) -> Identification:
+def _followed(found: Fit, passes: Passes) -> Fit:
     """The fit and what follows from it, as far as it came before an interruption."""
-    found, watch = fitted.fit, options().watch
+    watch = options().watch
     with suppress(KeyboardInterrupt):
-        coloured = interruptible(
-            lambda: coloured_covariance(found, None, lambda share: passes(2.0 * share, 3.0)), watch
-        )
-        fitted = dataclasses.replace(fitted, coloured=coloured)
-        last = lambda share: passes(2.0 + share, 3.0)
-        said = interruptible(lambda: identifiability(found, fitted.assessment, last), watch)
-        fitted = dataclasses.replace(fitted, said=said, complete=True)
-    return fitted
-
-
-def _show(identified: Identification) -> None:
-    terminal.say(f"The fit {identified.assessment.verdict()}.")
-    terminal.table(*identified.channel_table())
-    for sentence in identified.sentences():
-        terminal.say(sentence)
-    terminal.table(*identified.coefficient_table())
+        found = interruptible(lambda: found.allowing_colour(lambda share: passes(2.0 * share, 3.0)), watch)
+        found = interruptible(lambda: found.identified(lambda share: passes(2.0 + share, 3.0)), watch)
+    return found

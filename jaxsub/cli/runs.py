@@ -4,9 +4,10 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..checks import Checked, check
+from ..api.recordings import checked
+from ..checks import Checked
 from ..errors import InputError
-from ..findings import Finding, require_none
+from ..findings import Finding
 from ..recording import Recording, load, read_selection
 from ..vehicle import AbstractVehicle, check_units
 from . import terminal
@@ -25,9 +26,9 @@ def load_train_and_test(
     Of logs the file at `columns` says what to take. Warnings and notes are printed. Raises InputError as `checked_runs`
     does.
     """
-    checked = checked_runs(paths, held_out, vehicle, columns)
-    terminal.warn(checked.findings)
-    return list(checked.recordings), list(checked.held_out)
+    used = checked_runs(paths, held_out, vehicle, columns)
+    terminal.warn(used.findings)
+    return list(used.recordings), list(used.held_out)
 
 
 def checked_runs(
@@ -39,20 +40,17 @@ def checked_runs(
     """
     require_once(paths, held_out)
     read = lambda group: [load_run(path, vehicle, columns) for path in group]
-    checked = check(vehicle, read(paths), read(held_out))
-    require_none(checked.findings)
-    return checked
+    return checked(vehicle, read(paths), read(held_out))
 
 
 def checked_run(recording: Recording, vehicle: AbstractVehicle) -> Recording:
     """The recording, checked, in one piece. Raises InputError where a hole in time cuts it."""
-    checked = check(vehicle, [recording])
-    require_none(checked.findings)
-    if len(checked.recordings) > 1:
-        gap = next(finding for finding in checked.findings if finding.check == "time-gap" and finding.remedy)
+    used = checked(vehicle, recording)
+    if len(used.recordings) > 1:
+        gap = next(finding for finding in used.findings if finding.check == "time-gap" and finding.remedy)
         raise InputError(gap.place, gap.what.partition(":")[0], "cut the run there and give its parts one by one")
-    terminal.warn(checked.findings)
-    return next(iter(checked.recordings))
+    terminal.warn(used.findings)
+    return next(iter(used.recordings))
 
 
 def load_run(path: Path, vehicle: AbstractVehicle, columns: Path | None = None) -> Recording:

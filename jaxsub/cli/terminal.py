@@ -6,7 +6,6 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.measure import Measurement
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -16,8 +15,8 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Column, Table
 
+from ..api.table import Parts, Table
 from ..findings import Finding
 from ..plain import to_json
 from .options import options
@@ -62,12 +61,16 @@ def count(findings: Iterable[Finding]) -> None:
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """A table on standard output. Cells are never cut or wrapped, however narrow the terminal is."""
-    drawn = Table(*(Column(escape(header), no_wrap=True, overflow="ignore") for header in headers))
-    for row in rows:
-        drawn.add_row(*map(escape, row))
-    wide = results.options.update(max_width=10_000)
-    width = Measurement.get(results, wide, drawn).maximum
-    Console(file=results.file, width=width, highlight=False).print(drawn, crop=False)
+    results.file.write(f"{Table(headers, list(rows)).text()}\n")
+
+
+def show(parts: Parts) -> None:
+    """The lines and tables of a result."""
+    for part in parts:
+        if isinstance(part, Table):
+            table(part.heads, part.rows)
+        else:
+            say(part)
 
 
 @contextmanager

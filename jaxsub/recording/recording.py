@@ -12,9 +12,10 @@ from jaxsub.units import TIME, UnknownUnit, check_time_unit, column_unit, from_s
 
 FIRST_ROW = 2  # in a file the header is row 1
 _LISTED = 5  # further rows of an error
+_GAP = 1.5  # usual intervals that a gap is longer than
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """One run: float64 SI samples on strictly increasing times, NaN for a missing sample.
 
@@ -41,6 +42,21 @@ class Recording:
         self._check_times()
         for name, values in self.columns.items():
             check_column(self.source, self.first_row, self.times, name, values)
+
+    def __repr__(self) -> str:
+        steps = np.diff(self.times)
+        usual = float(np.median(steps))
+        late = steps[steps > _GAP * usual]
+        gaps = f"{late.size} longer, up to {late.max():.3g} s" if late.size else "no gaps"
+        length = f"{len(self.times)} samples, {self.duration:.6g} s, every {usual:.3g} s, {gaps}"
+        columns = ", ".join(self._described(name) for name in self.columns) or "none"
+        unusable = f"; unusable: {', '.join(self.unusable)}" if self.unusable else ""
+        return f"Recording {self.name!r} from {self.source}: {length}\ncolumns: {columns}{unusable}"
+
+    def _described(self, name: str) -> str:
+        missing = int(np.count_nonzero(np.isnan(self.columns[name])))
+        unit = f" [{self.units[name]}]" if name in self.units else ""
+        return f"{name}{unit}" + (f" ({missing} missing)" if missing else "")
 
     @property
     def duration(self) -> float:

@@ -1,10 +1,13 @@
 """The before-and-after figure: a run that the fit did not see, measured and modelled."""
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from ..discrepancy.diagnosis import ChannelQuality, Conclusions, Overlay
+from ..recording import Recording
+from ..vehicle import AbstractVehicle
 from .drawing import (
     BASELINE,
     GREY,
@@ -53,12 +56,41 @@ def draw_overlay(diagnosis: Conclusions) -> Picture | None:
     names = affected_channels(diagnosis, overlay)
     alt = f"Measured and modelled {', '.join(names)} in run {overlay.run}, and what remains over its noise"
     improved = diagnosis.improves
-    wide, narrow = (_render(overlay, names, diagnosis.quality, improved, page) for page in (WIDE, NARROW))
+    title = f"Not fitted: run {drawable(overlay.run, 40)}"
+    wide, narrow = (_render(overlay, names, diagnosis.quality, improved, page, title) for page in (WIDE, NARROW))
     return Picture("before-after", alt, wide, narrow)
 
 
+def draw_run(
+    vehicle: AbstractVehicle, recording: Recording, shown: Float[np.ndarray, "k c"], sigma: Float[np.ndarray, " c"]
+) -> Picture:
+    """Measured and modelled outputs of one run with their residuals, for the channels that are modelled worst.
+
+    `shown` are what `vehicle` shows at the samples of `recording`, and `sigma` the noise of its outputs, SI.
+    """
+    layout = vehicle.layout
+    measured = {name: recording.column(column) for name, column in layout.measured.items()}
+    modelled = {name: shown[:, index] for index, name in enumerate(layout.channels)}
+    overlay = Overlay(recording.name, recording.times, measured, modelled, {})
+    size = dict(zip(layout.channels, sigma.tolist(), strict=True))
+    miss = {name: _rms((measured[name] - modelled[name]) / size[name]) for name in measured}
+    names = sorted(miss, key=lambda name: -miss[name])[:_MOST_CHANNELS]
+    units = {name: layout.unit(name) for name in names}
+    quality = {name: ChannelQuality(name, units[name], 0, 0.0, size[name], False, 0.0) for name in names}
+    title = drawable(f"{layout.name}, run {recording.name}", 80)
+    alt = f"Measured and modelled {', '.join(names)} in run {recording.name}, and the residuals over their noise"
+    wide, narrow = (_render(overlay, names, quality, False, page, title, "model") for page in (WIDE, NARROW))
+    return Picture("run", alt, wide, narrow)
+
+
 def _render(
-    overlay: Overlay, names: list[str], quality: dict[str, ChannelQuality], improved: bool, page: PageWidth
+    overlay: Overlay,
+    names: list[str],
+    quality: dict[str, ChannelQuality],
+    improved: bool,
+    page: PageWidth,
+    title: str,
+    model: str = "baseline model",
 ) -> bytes:
     columns = min(page.columns, len(names))
     rows = -(-len(names) // columns)
@@ -70,8 +102,8 @@ def _render(
         above.set_ylabel(drawable(unit(known.unit)) if known else "SI unit")
         _residuals(below, overlay, name, known.sigma if known else 1.0, improved)
         below.set_ylabel("residual/σ")
-    figure.suptitle(f"Not fitted: run {drawable(overlay.run, 40)}", x=0.01, ha="left", fontsize=10.5)
-    figure.legend(handles=_legend(improved), loc="outside lower left", ncols=2 * page.columns)
+    figure.suptitle(title, x=0.01, ha="left", fontsize=10.5)
+    figure.legend(handles=_legend(improved, model), loc="outside lower left", ncols=2 * page.columns)
     return png(figure)
 
 
@@ -99,9 +131,9 @@ def _residuals(axes: Axes, overlay: Overlay, name: str, sigma: float, improved: 
     plain_ticks(axes, x=True, y=True)
 
 
-def _legend(improved: bool) -> list[Line2D]:
+def _legend(improved: bool, model: str) -> list[Line2D]:
     dots = Line2D([], [], color=INK, marker=".", linestyle="none", label="measured")
-    handles = [dots, Line2D([], [], color=BASELINE, label="baseline model")]
+    handles = [dots, Line2D([], [], color=BASELINE, label=model)]
     if improved:
         handles.append(Line2D([], [], color=IMPROVED, label="improved model"))
     return [*handles, Line2D([], [], color=PALE, linewidth=6, label="±2σ")]

@@ -11,8 +11,6 @@ from jaxtyping import Array, Float
 
 from ..arrays import Values
 from ..effects import (
-    INPUT_UNITS,
-    VELOCITIES,
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
@@ -23,113 +21,10 @@ from ..effects import (
     parameter_table,
     with_numbers,
 )
-from ..parameters import Parameter
-from .sensors.output import ANGLES, SPECIFIC_FORCE, Output, channel_unit
+from .description import described
+from .layout import Layout
+from .sensors.output import SPECIFIC_FORCE
 from .sensors.sensors import Sensors
-from .ties import Tie
-
-
-@dataclasses.dataclass(frozen=True)
-class Layout:
-    """The names in a vehicle file: everything about a vehicle that is not a number to estimate.
-
-    **Fields**
-
-    - `name`, `kind`: as in the file.
-    - `equations`: the free equations of motion, in order; `positions`: the position states, in order, then those of
-      effects with a memory.
-    - `inputs`, `prescribed`, `environment`: (name in the model, column in the recording) pairs. Inputs are held
-      between samples; the other two are interpolated.
-    - `outputs`: the measured channels.
-    - `parameters`: what may move, how far.
-    - `length`, `diameter`: of the hull, m.
-    - `ties`: numbers that follow from others.
-    - `input_units`: (input, SI unit) pairs of inputs other than those with a symbol, where that is known.
-    - `system`: in which the vehicle file gives its coefficients, in words; empty where they are in SI.
-    """
-
-    name: str
-    kind: str
-    equations: tuple[str, ...]
-    positions: tuple[str, ...]
-    inputs: tuple[tuple[str, str], ...]
-    prescribed: tuple[tuple[str, str], ...]
-    environment: tuple[tuple[str, str], ...]
-    outputs: tuple[Output, ...]
-    parameters: tuple[Parameter, ...]
-    length: float = 0.0
-    diameter: float = 0.0
-    system: str = ""
-    ties: tuple[Tie, ...] = ()
-    input_units: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def held(self) -> tuple[str, ...]:
-        """Columns that are held between samples."""
-        return tuple(column for _, column in self.inputs)
-
-    @property
-    def interpolated(self) -> tuple[str, ...]:
-        """Columns that are interpolated between samples."""
-        return tuple(column for _, column in (*self.prescribed, *self.environment))
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The names of the outputs, by default their channels."""
-        return tuple(output.name for output in self.outputs)
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The measured column of each output."""
-        return tuple(output.column for output in self.outputs)
-
-    @property
-    def measured(self) -> dict[str, str]:
-        """The measured columns by output."""
-        return {output.name: output.column for output in self.outputs}
-
-    @property
-    def plain(self) -> dict[str, str]:
-        """By channel the measured or prescribed column that has it as it is at the origin, but for an offset."""
-        known = {row.name.rpartition(".")[0] for row in self.parameters if not row.name.endswith(".offset")}
-        moved = lambda o: any(o.lever_arm) and o.channel not in SPECIFIC_FORCE
-        own = [o for o in self.outputs if not (o.unit or o.frame or moved(o) or {o.name, o.table} & known)]
-        prescribed = {name: column for name, column in self.prescribed if name not in known}
-        return prescribed | {output.channel: output.column for output in reversed(own)}
-
-    @property
-    def angles(self) -> tuple[str, ...]:
-        """The columns, measured or of prescribed motions, that a whole turn leaves as they are."""
-        prescribed = (column for name, column in self.prescribed if self.is_angle(name))
-        return (*(output.column for output in self.outputs if self.is_angle(output.channel)), *prescribed)
-
-    def is_angle(self, channel: str) -> bool:
-        """Whether a whole turn leaves a channel as it is, as it does a body's Euler angles."""
-        return self.kind == "submerged-body" and channel in ANGLES
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the states: velocities of the free equations (`v` of a body, `x_rate` of a mechanism), positions."""
-        body = self.kind == "submerged-body"
-        return (*(VELOCITIES[e] if body else f"{e}_rate" for e in self.equations), *self.positions)
-
-    @property
-    def free(self) -> list[Parameter]:
-        """The parameters that an estimator may move."""
-        return [parameter for parameter in self.parameters if parameter.free]
-
-    def unit(self, name: str) -> str:
-        """The SI unit of an output, or of a body's channel or state.
-
-        Nothing for a mechanism's that states none: its `q` may be in metres or volts.
-        """
-        output = next((one for one in self.outputs if one.name == name), Output(name))
-        return output.unit or (channel_unit(output.channel) if self.kind == "submerged-body" else "")
-
-    def input_unit(self, name: str) -> str:
-        """The SI unit of an input; nothing where the vehicle file does not say."""
-        known = INPUT_UNITS if self.kind == "submerged-body" else {}
-        return known.get(name) or dict(self.input_units).get(name, "")
 
 
 class AbstractVehicle(eqx.Module):
@@ -143,6 +38,9 @@ class AbstractVehicle(eqx.Module):
     layout: eqx.AbstractVar[Layout]
     effects: eqx.AbstractVar[tuple[AbstractEffect, ...]]
     sensors: eqx.AbstractVar[Sensors]
+
+    def __repr__(self) -> str:
+        return described(self.layout, self.values())
 
     @abc.abstractmethod
     def mass_matrix(self) -> Float[Values, "n n"]:

@@ -15,7 +15,7 @@ FILES = sorted(HOUSE.rglob("*.py"))
 ORDER = (
     "errors", "findings", "plain", "storage", "unit_names", "units", "arrays", "parameters", "results", "symbolic",
     "recording", "effects", "sensors", "vehicle", "simulation", "filter", "navigation", "likelihood", "estimate",
-    "information", "checks", "discrepancy", "control", "sweeps", "report", "cli", "__main__",
+    "information", "checks", "discrepancy", "control", "sweeps", "report", "api", "cli", "__main__",
 )  # fmt: skip
 
 

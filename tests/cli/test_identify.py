@@ -123,7 +123,7 @@ def test_interruption_after_the_fit_keeps_the_fit(files, monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("jaxsub.cli.identify.identifiability", interrupted)
+    monkeypatch.setattr("jaxsub.api.fits.determined", interrupted)
     with pytest.raises(SystemExit) as stop:
         identify(monkeypatch, capsys, files)
     assert stop.value.code == 130

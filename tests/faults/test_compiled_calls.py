@@ -38,8 +38,9 @@ def write(grace):
 process.run(app)
 """
 IDENTIFY = f"""{ENDLESS}
-from jaxsub.cli import identify, main
-identify.identifiability = endless
+from jaxsub.api import fits
+from jaxsub.cli import main
+fits.determined = endless
 main()
 """
 SWEEP = f"""{ENDLESS}

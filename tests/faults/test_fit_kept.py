@@ -14,11 +14,12 @@ from trees import ROOT
 COMMAND = f"""
 import sys, time
 sys.path.insert(0, {str(ROOT)!r})
-from jaxsub.cli import identify, main
+from jaxsub.api import fits
+from jaxsub.cli import main
 def waiting(*_):
     print("fitted", flush=True)
     time.sleep(600)
-identify.coloured_covariance = waiting
+fits.coloured_covariance = waiting
 main()
 """
 

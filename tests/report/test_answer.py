@@ -10,8 +10,12 @@ import click
 import jax.numpy as jnp
 import pytest
 from report_examples import bare, diagnosis
+from rigs import write_rig
 
-from jaxsub.cli.diagnose import Answer, added
+import jaxsub as js
+from jaxsub.api.diagnoses import Diagnosis
+from jaxsub.cli import main
+from jaxsub.cli.diagnose import added, emit
 from jaxsub.cli.options import Options
 from jaxsub.discrepancy.diagnosis import Explained
 from jaxsub.effects import QuadraticDamping, numbers, vocabulary
@@ -21,7 +25,7 @@ from jaxsub.vehicle.catalogue import dsrv
 
 def shown(capsys, made, **options):
     with click.Context(click.Command("diagnose"), obj=Options(**options)):
-        Answer(made, dsrv(), None).emit()
+        emit(Diagnosis(made, dsrv()))
     return capsys.readouterr().out
 
 
@@ -38,7 +42,7 @@ def test_json_is_the_file_and_nothing_else(verdict, capsys, tmp_path):
     assert content["fit"]["held_out"]["baseline"]["v"] is None and content["explained"] is None
     assert [one["check"] for one in content["warnings"]] == ["sentinel", "header-row"]
     if verdict == "none":
-        Answer(made, dsrv(), None).write(tmp_path)
+        Diagnosis(made, dsrv()).write(tmp_path)
         assert json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8")) == content
         assert {path.name for path in tmp_path.iterdir()} == {
             "diagnosis.json",
@@ -53,7 +57,7 @@ def test_accepted_effect_of_one_derivative_is_a_coefficient_in_file_and_page_and
     improved = dsrv().with_effect(QuadraticDamping("pitch", jnp.asarray(-2e4)))
     made = diagnosis("named", samples=40)
     known = [dataclasses.replace(made.coefficients[0], name=name) for name in dsrv().values()]
-    Answer(dataclasses.replace(made, coefficients=known), improved, None).write(tmp_path)
+    Diagnosis(dataclasses.replace(made, coefficients=known), improved).write(tmp_path)
     file = tomllib.loads((tmp_path / "improved.toml").read_text(encoding="utf-8"))
     assert file["coefficients"]["M_q|q|"] == {"value": -2e4}
     assert "effects" not in file
@@ -84,3 +88,38 @@ def test_a_figures_file_has_a_plain_short_name_of_its_own():
     stems = [file_stem(name) for name in names]
     assert len(set(stems)) == len(names) and max(map(len, stems)) < 128
     assert all("/" not in stem and "\\" not in stem and stem.isascii() and stem.isprintable() for stem in stems)
+
+
+def test_the_front_door_hands_over_what_the_command_does(tmp_path, monkeypatch, capsys):
+    """Claim: checked runs, test run and effects are those of `jaxsub diagnose`; it saves and shows the same answer."""
+    write_rig(tmp_path)
+    write = lambda name, run: js.save(run, tmp_path / f"{name}.csv")
+    run = js.load(tmp_path / "run.csv")
+    write("other", run.between(1.0, 12.0))
+    handed = []
+    made = diagnosis("named", samples=40)
+
+    def conclude(vehicle, train, test, **options):
+        handed.append([[r.columns["x"].tolist() for r in runs] for runs in (train, test)])
+        handed[-1].append(options["vocabulary"])
+        return made, vehicle
+
+    monkeypatch.setattr("jaxsub.api.diagnoses.conclude", conclude)
+    # the page and its figures have tests of their own
+    monkeypatch.setattr("jaxsub.report.write_report", lambda *_: None)
+    monkeypatch.setattr("jaxsub.report.draw", lambda _: {"scan": "the scan"})
+    paths = [tmp_path / "vehicle.toml", tmp_path / "run.csv", tmp_path / "other.csv"]
+    monkeypatch.setattr("sys.argv", ["jaxsub", "diagnose", *map(str, paths), "--out", str(tmp_path / "out")])
+    main()
+    runs = [js.load(path) for path in paths[1:]]
+    found = js.diagnose(js.read_vehicle(paths[0]), runs, effects=js.vocabulary())
+    js.diagnose(js.read_vehicle(paths[0]), runs[0], runs[1], effects=js.vocabulary())
+    assert handed[0] == handed[1] == handed[2] and len(handed[0][0]) == len(handed[0][1]) == 1
+    found.save(tmp_path / "saved")
+    for name in ("diagnosis.json", "improved.toml"):
+        assert (tmp_path / "saved" / name).read_bytes() == (tmp_path / "out" / name).read_bytes()
+    assert made.summary in repr(found) and "0.614 ± 0.021" in found.summary() and "0.614" in found._repr_html_()
+    assert set(found.to_dataframe().effect) == {one.label for one in made.physics}
+    assert found.plot() == found.plot("scan") == "the scan"
+    with pytest.raises(js.InputError, match="there is no figure 'none'"):
+        found.plot("none")

@@ -1,0 +1,28 @@
+"""Recordings as the functions of the front door take them: one or several, checked as commands check them."""
+
+from collections.abc import Sequence
+
+from ..checks import Checked, check
+from ..findings import require_none
+from ..recording import Recording
+from ..vehicle import AbstractVehicle, check_units
+
+# what a function of the front door takes
+Recordings = Recording | Sequence[Recording]
+
+
+def listed(recordings: Recordings) -> list[Recording]:
+    """The recordings, one of them too, as a list."""
+    return [recordings] if isinstance(recordings, Recording) else list(recordings)
+
+
+def checked(vehicle: AbstractVehicle, recordings: Recordings, held_out: Recordings = ()) -> Checked:
+    """What `check` finds in the recordings, none of it an error, and the runs as they will be used.
+
+    **Raises** `InputError` for the first finding that is an error, and for a column in another unit than its channel.
+    """
+    runs, held = listed(recordings), listed(held_out)
+    check_units(vehicle.layout, [*runs, *held])
+    found = check(vehicle, runs, held)
+    require_none(found.findings)
+    return found
