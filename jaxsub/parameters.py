@@ -14,6 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Bool, Float
 
+from .programs import compiled
+
 # of the way to a bound, the most that a step goes
 _PART = 0.9
 
@@ -78,7 +80,7 @@ class Transform(eqx.Module):
         one = jnp.where(low, lower + soft, upper - soft)
         return self._as_bounded(both, one, self.centre + self.scale * y)
 
-    @eqx.filter_jit
+    @compiled
     def to_free(self, theta: Float[Array, " p"]) -> Float[Array, " p"]:
         """Coordinates of the physical values `theta`, which are first moved just inside their bounds."""
         low, lower, upper = self._bounds()

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..findings import Finding
+from ..programs import compiled
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
 from .spans import amount
@@ -48,7 +48,7 @@ def _through(vehicle: AbstractVehicle, index: int) -> list[str]:
     return [name for name, absent in zip(sorted(values), gone, strict=True) if absent]
 
 
-@eqx.filter_jit
+@compiled
 def _effects(
     vehicle: AbstractVehicle, values: dict[str, Array], state: Float[Array, " s"], signals: Float[Array, " m"]
 ) -> Float[Array, "n p"]:

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..findings import Finding
+from ..programs import compiled
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
 from .spans import amount
@@ -63,7 +63,7 @@ def _mean_signals(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> 
     return jnp.array([mean(name) if name in surroundings else 0.0 for name in columns], float)
 
 
-@eqx.filter_jit
+@compiled
 def _rates(vehicle: AbstractVehicle, signals: Float[Array, " m"]) -> Float[Array, "s s"]:
     """The derivative of the state's rate with respect to the state, about rest at operating speed."""
     layout = vehicle.layout

@@ -12,6 +12,7 @@ from typing import Any
 import jax
 import platformdirs
 
+from ..programs import keep_programs
 from . import terminal
 
 # up to a third less time, for programs that run as fast; on jax 0.10 half, for programs up to a quarter slower
@@ -41,7 +42,8 @@ def _keep_programs() -> None:
     """Keep compiled programs in the user's cache; without a folder for it, go on and compile them every time."""
     try:
         folder = _cache() / f"jax-{jax.__version__}"
-        folder.mkdir(parents=True, exist_ok=True)
+        lowered = folder / "lowered"
+        lowered.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         where = f"{error.filename}: {error.strerror}" if error.filename else error
         terminal.note(f"note: compiled programs are not kept: {where}; set XDG_CACHE_HOME")
@@ -49,6 +51,7 @@ def _keep_programs() -> None:
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    keep_programs(lowered)
     _repair(folder)
 
 

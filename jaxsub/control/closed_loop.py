@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from ..effects import AbstractSensor
 from ..errors import InputError, nearest
+from ..programs import compiled
 from ..recording import Recording
 from ..recording.runs import Runs, stack_runs
 from ..simulation import Sampled, at_rest
@@ -88,7 +89,7 @@ def _before(vehicle: AbstractVehicle, times: np.ndarray, given: Mapping[str, np.
     return stack_runs([blank], held=layout.held, interpolated=layout.interpolated, channels=layout.columns)
 
 
-@eqx.filter_jit
+@compiled
 def _flown(flight: _Flight, start: Array) -> tuple[Float[Array, "k s"], Float[Array, "k m"], Float[Array, "k c"]]:
     """States, signals and outputs at the samples."""
     vehicle, runs = flight.vehicle, flight.runs

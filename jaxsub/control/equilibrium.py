@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 
 from ..errors import InputError, require_known
 from ..information.design_limits import producible
+from ..programs import compiled
 from .plant import Plant, Time
 
 # what moves a body only through effects that follow it
@@ -68,7 +69,7 @@ def trim(
     return _found(plant, state, targets, jnp.asarray(time, state.dtype), names, tuple(moving))
 
 
-@eqx.filter_jit
+@compiled
 def _found(
     plant: Plant, state: Array, targets: Array, time: Array, names: tuple[str, ...], moving: tuple[int, ...]
 ) -> Trim:

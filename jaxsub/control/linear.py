@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..errors import InputError
+from ..programs import compiled
 from ..vehicle.base import stack
 from .plant import Jacobians, Plant, Time
 
@@ -45,7 +46,7 @@ class LinearPlant(eqx.Module):
         return self.y + self.C @ (x - self.x) + self.D @ (u - self.u)
 
 
-@eqx.filter_jit
+@compiled
 def linearise(plant: Plant, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> LinearPlant:
     """The sampled plant about a point, such as a trim: exact derivatives of its step and outputs."""
     drift = plant.step(x, u, time) - x
@@ -63,7 +64,7 @@ def linearise_rates(plant: Plant, x: Float[Array, " s"], u: Float[Array, " m"], 
     return _rates_about(plant, x, u, time)
 
 
-@eqx.filter_jit
+@compiled
 def _rates_about(plant: Plant, x: Array, u: Array, time: Time) -> LinearPlant:
     def rates(x: Array, u: Array) -> Array:
         signals = plant.acting(u, time)
@@ -93,7 +94,7 @@ def linearisation_error(
     return _apart(plant, linear, inputs, time)
 
 
-@eqx.filter_jit
+@compiled
 def _apart(plant: Plant, linear: LinearPlant, inputs: Array, time: Time) -> Float[Array, " s"]:
     def on(x: Array, u: Array) -> tuple[Array, Array]:
         after = linear.step(x, u)

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from ..effects import VELOCITIES
 from ..errors import InputError
 from ..parameters import number
+from ..programs import compiled
 from ..simulation import at_rest
 from ..vehicle import AbstractVehicle
 
@@ -97,7 +98,7 @@ def axis(
     )
 
 
-@eqx.filter_jit
+@compiled
 def _derivatives(
     vehicle: AbstractVehicle, state: Float[Array, " s"]
 ) -> tuple[Float[Array, "n s"], Float[Array, "n m"]]:

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, AbstractSensor
 from ..errors import InputError, require_known
 from ..filter.model import linearised
+from ..programs import compiled
 from ..simulation import Sampled, step_table
 from ..simulation.exponential import StepTable
 from ..vehicle import AbstractVehicle
@@ -211,7 +212,7 @@ def _ready(vehicle: AbstractVehicle, dt: float, substeps: int) -> Sampled:
     return Sampled(vehicle, *_weights(vehicle, dt / substeps), substeps)
 
 
-@eqx.filter_jit
+@compiled
 def _weights(vehicle: AbstractVehicle, length: float) -> tuple[Array, StepTable]:
     """The inverse inertia, and the weights of one step length in s."""
     inverse = jnp.linalg.inv(vehicle.mass_matrix())

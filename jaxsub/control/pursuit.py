@@ -4,7 +4,6 @@ import dataclasses
 import time
 from collections.abc import Mapping
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +11,7 @@ from jaxtyping import Array, Float
 
 from ..errors import InputError
 from ..filter import AbstractFilter, FilterState, Sample
+from ..programs import compiled
 from ..recording import Recording
 from ..simulation import at_rest
 from ..vehicle import recorded_columns
@@ -91,22 +91,22 @@ def pursue(
     return _assembled(truth, mpc, table, rows, name)
 
 
-@eqx.filter_jit
+@compiled
 def _shown(truth: Plant, x: Array, u: Array, now: Array) -> tuple[Array, dict[str, Array]]:
     return truth.output(x, u, now), truth.channels(x, u, now)
 
 
-@eqx.filter_jit
+@compiled
 def _moved(truth: Plant, x: Array, u: Array, now: Array) -> Array:
     return truth.step(x, u, now)
 
 
-@eqx.filter_jit
+@compiled
 def _estimated(follower: AbstractFilter, state: FilterState, sample: Sample) -> FilterState:
     return follower.step(state, sample)[0]
 
 
-@eqx.filter_jit
+@compiled
 def _planned(mpc: Mpc, plan: Plan, x: Array, reference: Array, now: Array) -> tuple[Plan, Array, Solved]:
     return mpc.command(plan, x, reference, now)
 

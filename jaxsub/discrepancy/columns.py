@@ -26,6 +26,7 @@ from ..effects import (
     with_numbers,
 )
 from ..likelihood import Columns
+from ..programs import compiled
 from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle
 from .view import View
@@ -163,12 +164,12 @@ def actuator_forces(
     return forces
 
 
-@eqx.filter_jit
+@compiled
 def _force(vehicle: AbstractVehicle, motion: Motion) -> Array:
     return vehicle.force(motion)
 
 
-@eqx.filter_jit
+@compiled
 def _respond(stacks: list[AbstractActuator], times: Values, nodes: Sequence[Values]) -> list[Array]:
     """What the actuators of each stack do at their `nodes` (N, R, K-1, 3), one program for all of them."""
     one = lambda effect, nodes: jax.vmap(effect.respond)(times, nodes)

@@ -8,7 +8,6 @@ from the best few of the recorded inputs and random telegraph signals.
 import dataclasses
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +18,7 @@ from ..errors import InputError
 from ..estimate import Problem, batch
 from ..information.design_limits import Bounds, Limits, Range
 from ..information.design_search import descend, telegraphs
+from ..programs import compiled
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulation import sampled_states
@@ -143,7 +143,7 @@ def recorded_limits(vehicle: AbstractVehicle, like: Recording) -> Limits:
     return Limits(amplitude, rate, channels)
 
 
-@eqx.filter_jit
+@compiled
 def _judged(
     tried: Float[Array, "b k m"], rivals: Rivals
 ) -> tuple[Float[Array, "b k m"], Float[Array, "b r r"], Float[Array, " b"]]:

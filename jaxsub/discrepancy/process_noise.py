@@ -12,7 +12,6 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -33,6 +32,7 @@ from ..filter import (
     samples,
     state_scale,
 )
+from ..programs import compiled
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulation import simulate
@@ -186,7 +186,7 @@ def floor(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values,
     return NOISE_FLOOR * state_scale(vehicle, sigma)[: len(vehicle.layout.equations)]
 
 
-@eqx.filter_jit
+@compiled
 def noise_densities(
     vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"], sigma: Float[Array, " c"], copies: int
 ) -> tuple[Float[Array, "m r k n"], Float[Array, "r k n"]]:

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Iterable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -23,6 +22,7 @@ from ..likelihood import (
     part_products,
     smoothed,
 )
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle, quantities_of
@@ -174,7 +174,7 @@ def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturb
     return every, [dataclasses.replace(guess, noise=noise) for noise in alone]
 
 
-@eqx.filter_jit
+@compiled
 def _guessed(model: Linearised, runs: Runs, sigma: Array, spread: Array) -> Disturbance:
     """The first guess of the disturbance, by the residuals of a fit."""
     return first_guess(System.of(model, runs, sigma, spread), model.error / sigma)

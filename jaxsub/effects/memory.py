@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array
 
 from ..parameters import number
+from ..programs import compiled
 from .base import AbstractForce, amplitude, shape, stacked
 from .motion import FORCES, Facts, Motion, Signal, unit_per
 
@@ -149,7 +150,7 @@ def with_memories(
     return found
 
 
-@eqx.filter_jit
+@compiled
 def _remembered(
     stacks: list[AbstractMemory], start: Motion, end: Motion, steps: Signal
 ) -> list[tuple[dict[str, Array], dict[str, Array]]]:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values
+from ..programs import compiled
 from ..results import RESULTS
 from .damped import Damped, State
 from .method import Found, Iterative, Passes, by_cost, from_start, unwatched
@@ -98,7 +99,7 @@ def raced(searches: Sequence[Descent], tell: Passes = unwatched) -> Descent:
     return searches[0]
 
 
-@eqx.filter_jit
+@compiled
 def _step(
     solver: Damped, problem: Problem, y: Array, state: State, gram: Float[Array, "r q q"]
 ) -> tuple[Array, State, Bool[Array, ""], RESULTS]:
@@ -109,7 +110,7 @@ def _step(
     return y, state, done, result
 
 
-@eqx.filter_jit
+@compiled
 def _ended(y: Array, cost: Array, steps: Array, result: RESULTS) -> Found:
     """One search, as the only one of several."""
     return jax.tree.map(lambda leaf: leaf[None], Found(y, cost, steps, from_start(result, steps)))

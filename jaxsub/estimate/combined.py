@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..programs import compiled
 from .method import AbstractMethod, Found, Passes, costs, lanes_for, problems
 from .problem import Problem
 
@@ -99,6 +100,6 @@ class Global(AbstractMethod):
         return evolved.x, sampled
 
 
-@eqx.filter_jit
+@compiled
 def _population_costs(problem: Problem, members: Float[Array, "n d"]) -> Float[Array, " n"]:
     return costs(lambda _: problem, members, lanes_for(problem))

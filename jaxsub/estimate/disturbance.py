@@ -11,7 +11,6 @@ quasi-Newton search needs a hundred.
 import dataclasses
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +19,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values, namespace
 from ..likelihood import Averages, Columns, Disturbance, System, covariance_derivatives, restricted, total_products
+from ..programs import compiled
 from .damped import Damped
 from .problem import Expansion
 
@@ -75,7 +75,7 @@ def estimate_disturbance(
     return found
 
 
-@eqx.filter_jit
+@compiled
 def _search(given: _Given, begin: Disturbance, steps: int) -> tuple[Disturbance, Bool[Array, ""]]:
     """At most so many `steps` from `begin`, and whether they arrived."""
     solver = Damped(_expand, _ENOUGH, _FARTHEST)
@@ -104,7 +104,7 @@ def _unlikely(y: Array, given: _Given) -> tuple[Array, Array]:
     return 0.5 * jnp.sum(away**2 + over**2), each(*_LOOSE) ** -2.0 + (over > 0.0) * _EDGE**-2.0
 
 
-@eqx.filter_jit
+@compiled
 def _cost(y: Array, given: _Given) -> Array:
     return restricted(*_products(y, given)) + _unlikely(y, given)[0]
 
@@ -117,7 +117,7 @@ def _products(y: Array, given: _Given) -> tuple[Array, Array]:
     return sum(grams, given.prior), sum(spreads, jnp.zeros(()))
 
 
-@eqx.filter_jit
+@compiled
 def _expand(given: _Given, y: Array) -> Expansion:
     """The cost to second order, with the average information for its curvature."""
 

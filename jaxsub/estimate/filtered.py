@@ -10,6 +10,7 @@ from ..filter.ekf import AbstractFilter
 from ..filter.mekf import ModifiedKalmanFilter
 from ..filter.passes import identify
 from ..filter.vehicle import VehicleProcess, samples
+from ..programs import compiled
 from ..results import NONFINITE, RESULTS, SUCCESSFUL
 from .damped import Damped
 from .method import AbstractMethod, Found, Passes, costs, holding, in_shares, lanes_for, objective, problems
@@ -50,7 +51,7 @@ class Filtered(AbstractMethod):
         return in_shares(_filtered, self, problem, starts, outputs)
 
 
-@eqx.filter_jit
+@compiled
 def _filtered(method: Filtered, problem: Problem, starts: Array, outputs: Array | None) -> Found:
     of, lanes, p = problems(problem, outputs), lanes_for(problem), len(problem.prior_mean)
     process = VehicleProcess(problem.vehicle, problem.transform, problem.runs.substeps)

@@ -13,6 +13,7 @@ from jaxtyping import Array, Bool, Float
 from ..arrays import Values, quietly
 from ..filter.vehicle import unfilterable
 from ..likelihood import BlockLinearised, Watch, concentrated_sigma, nobody, output_errors
+from ..programs import compiled
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..results import RESULTS
@@ -194,7 +195,7 @@ def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " 
     return SearchEnd(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
 
 
-@eqx.filter_jit
+@compiled
 def _signal(runs: Runs) -> Array:
     """The standard deviation of each measured channel: where the search for its noise starts."""
     count = jnp.maximum(runs.samples(), 1.0)
@@ -267,7 +268,7 @@ def evaluate(ended: AbstractSearchEnd, watch: Watch = nobody) -> Solution:
     return Solution(**fields, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
 
 
-@eqx.filter_jit
+@compiled
 def _statistics(
     problem: Problem, products: Float[Array, "r q q"], result: RESULTS
 ) -> tuple[Array, Array, Array, RESULTS]:

@@ -11,7 +11,6 @@ show by how much.
 import dataclasses
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +19,7 @@ from jaxtyping import Array, Bool, Float
 from ..arrays import Values
 from ..effects import AbstractForce, AbstractMemory, Motion
 from ..likelihood import concentrated_sigma
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import Trajectory, sampled_states, simulate
 from ..vehicle import AbstractVehicle
@@ -111,7 +111,7 @@ def substeps_unseen(vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: V
     return steps if finite else runs.substeps
 
 
-@eqx.filter_jit
+@compiled
 def _halved(vehicle: AbstractVehicle, runs: Runs, start: Array) -> tuple[Float[Array, " c"], Bool[Array, ""]]:
     """What half as long steps change of each channel, rms, SI, and whether what they show is finite."""
     finer = simulate(vehicle, dataclasses.replace(runs, substeps=2 * runs.substeps), start)

@@ -15,6 +15,7 @@ import optimistix as optx
 from jax.sharding import Mesh, PartitionSpec
 from jaxtyping import Array, Bool, Float, Int
 
+from ..programs import compiled
 from ..results import NONFINITE, RESULTS
 from .pool import pool
 from .problem import Problem
@@ -148,7 +149,7 @@ def _over_cores(program: Any, method: Any, problem: Problem, rounds: Sequence[tu
         return list(threads.map(own, rounds))
 
 
-@eqx.filter_jit
+@compiled
 def _over_devices(program: Callable, method: Any, problem: Problem, starts: Array, outputs: Array | None) -> Any:
     """One share on each local device; none waits for another before the end."""
     mesh, each, same = Mesh(np.array(jax.local_devices()), ("share",)), PartitionSpec("share"), PartitionSpec()
@@ -158,7 +159,7 @@ def _over_devices(program: Callable, method: Any, problem: Problem, starts: Arra
     return shared(numbers, starts, outputs)
 
 
-@eqx.filter_jit
+@compiled
 def pooled(method: Iterative, problem: Problem, starts: Array, outputs: Array | None) -> Found:
     """A search from each of the starts, `lanes_for` at a time."""
     of, lanes = problems(problem, outputs), lanes_for(problem)

@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Array, Float, Key, PRNGKeyArray
 
 from ..errors import InputError, optional
+from ..programs import compiled
 from .fitting import Solution
 from .problem import Problem
 
@@ -127,7 +128,7 @@ def posterior(found: Solution, *, draws: int = 1000, warmup: int = 300, chains: 
     return data
 
 
-@eqx.filter_jit
+@compiled
 def _chains(
     target: Target, keys: Key[Array, " n"], starts: Float[Array, "n d"], warmup: int, draws: int
 ) -> tuple[Float[Array, "n m d"], dict[str, Array]]:

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..likelihood import Watch, errors, nobody, summed_products, value_and_columns
 from ..likelihood.march import March
 from ..parameters import Transform
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .curvature import Arrow
@@ -109,7 +110,7 @@ class Problem(eqx.Module):
         march = March(free.vehicle_at, (near(), near()), self.runs, start=not self.known_start)
         return dataclasses.replace(self, march=march)
 
-    @eqx.filter_jit
+    @compiled
     def split(self, y: Float[Array, " d"]) -> tuple[AbstractVehicle, Float[Array, "r s"]]:
         """The vehicle and the initial states that the coordinates `y` stand for."""
         return self.vehicle_at(y[: len(self.prior_mean)]), self.guess + self.spread * self.moved(y)
@@ -156,7 +157,7 @@ class Problem(eqx.Module):
         squares = self.march.squares(self.vehicle_at, y[: len(self.prior_mean)], start, self.runs, self.sigma)
         return 0.5 * (jnp.sum(squares) + jnp.sum(_prior(self, y) ** 2))
 
-    @eqx.filter_jit
+    @compiled
     def expand(self, y: Float[Array, " d"]) -> "Expansion":
         """The cost about `y` to second order, its curvature by Gauss and Newton: $J^TJ$."""
         return self.expansion(y, self.products(y))
@@ -202,7 +203,7 @@ class Problem(eqx.Module):
         kept = np.array([*range(p), q - 1]) if self.known_start else np.arange(q)
         return jax.device_put((scale[:, None] * gram * scale)[:, kept[:, None], kept])
 
-    @eqx.filter_jit
+    @compiled
     def expand_exactly(self, y: Float[Array, " d"]) -> "Expansion":
         """The cost about `y` to second order, its curvature exact."""
         cost, gradient, hessian, _ = second_order(lambda y, _: (self.cost(y), None), y, None)
@@ -228,14 +229,14 @@ class Expansion(eqx.Module):
         return self.curvature.dense() if isinstance(self.curvature, Arrow) else self.curvature
 
 
-@eqx.filter_jit
+@compiled
 def _outputs(problem: Problem, y: Array, moved: Array) -> Float[Array, "r k c"]:
     """Whitened errors at `y`, the initial states of all runs moved by the same `moved` (in their spreads)."""
     vehicle, start = problem.split(y)
     return errors(vehicle, problem.runs, start + problem.spread * moved) / problem.sigma
 
 
-@eqx.filter_jit
+@compiled
 def _split(problem: Problem, y: Array) -> tuple[AbstractVehicle, Array, Float[Array, " q"]]:
     """Vehicle and initial states at `y`; and the errors' columns by it, in those of the outputs by physical values."""
     p = len(problem.prior_mean)

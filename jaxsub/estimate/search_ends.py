@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..programs import compiled
 from ..results import RESULTS
 from .damped import room_downhill
 from .fitting import inverse_information, judged, standard_errors_away
@@ -33,7 +34,7 @@ def ends(problem: Problem, found: Found, outputs: Float[Array, "n r k c"] | None
     return Ends(theta, errors, away, _judged(problem, theta, away, found.result))
 
 
-@eqx.filter_jit
+@compiled
 def _told(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array | None) -> tuple[Array, Array, Array]:
     of, p = problems(problem, outputs), len(problem.prior_mean)
 
@@ -50,7 +51,7 @@ def _told(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array | No
     return jax.lax.map(one, (jnp.arange(len(y)), y), batch_size=lanes_for(problem))
 
 
-@eqx.filter_jit
+@compiled
 def _judged(problem: Problem, theta: Float[Array, "n p"], away: Float[Array, " n"], result: RESULTS) -> RESULTS:
     names = [row.name for row in problem.vehicle.layout.free]
     vehicle = lambda theta: problem.vehicle.with_values(dict(zip(names, theta, strict=True)))

@@ -2,12 +2,12 @@
 
 import dataclasses
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
+from ..programs import compiled
 from .method import Found
 from .problem import Problem
 
@@ -129,6 +129,6 @@ def _connected(points: Float[np.ndarray, "n d"]) -> Int[np.ndarray, " n"]:
     return connected_components(graph, directed=False)[1][member]
 
 
-@eqx.filter_jit
+@compiled
 def _curvature(problem: Problem, y: Float[Array, " d"]) -> Float[Array, "d d"]:
     return problem.expand(y).hessian

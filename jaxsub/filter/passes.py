@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from ..programs import compiled
 from .ekf import AbstractFilter, Estimate, FilterState
 from .model import Sample
 
@@ -41,7 +42,7 @@ class Identified(eqx.Module):
     diverged: Bool[Array, ""]
 
 
-@eqx.filter_jit
+@compiled
 def identify(
     filter: AbstractFilter,
     samples: Sample,

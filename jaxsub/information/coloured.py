@@ -20,6 +20,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..estimate import Problem, Solution
 from ..likelihood import Adjoint, Disturbance, Linearised, System, Watch, carried_back, carried_to_start, nobody
+from ..programs import compiled
 from ..recording.runs import Runs
 from .residual_disturbance import Directions, residual_disturbance, whitened_columns
 
@@ -73,7 +74,7 @@ class _Reduced(NamedTuple):
     untold: Array
 
 
-@eqx.filter_jit
+@compiled
 def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array, " p"]) -> _Reduced:
     p = len(held)
     theta = jnp.where(held[:, None] | held, 0.0, products[:, :p, :p])
@@ -98,7 +99,7 @@ def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array
     return _Reduced(gain, pinned, Directions(held, basis, prior), untold)
 
 
-@eqx.filter_jit
+@compiled
 def _back(
     problem: Problem,
     runs: Runs,
@@ -114,7 +115,7 @@ def _back(
     return carried_back(disturbance, system, left, after)
 
 
-@eqx.filter_jit
+@compiled
 def _sandwich(reduced: _Reduced, disturbance: Disturbance, adjoint: Adjoint) -> Float[Array, "p p"]:
     """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
     basis, untold = reduced.directions.basis, reduced.untold

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..errors import InputError
+from ..programs import compiled
 from ..simulation.synthesis import at_rest
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import stack
@@ -137,7 +138,7 @@ class Conditions(eqx.Module):
         felt = jnp.zeros(n, bool).at[np.array([i for i in self.felt if i < n], int)].set(True)
         return jnp.where(felt[:, None] & felt, T, jnp.eye(n))
 
-    @eqx.filter_jit
+    @compiled
     def mismatch(self, unknowns: Float[Array, " u"]) -> Float[Array, " e"]:
         """By how much the changed system is not equivalent, at every point; rows of the order of one."""
         theta, S, shift = self.change(unknowns)
@@ -148,7 +149,7 @@ class Conditions(eqx.Module):
         both = jnp.concatenate([rates[:, np.array(self.felt, int)], shown[:-1]], axis=-1)
         return (both / self.row).ravel()
 
-    @eqx.filter_jit
+    @compiled
     def jacobian(self, unknowns: Float[Array, " u"]) -> Float[Array, "e u"]:
         """The Jacobian of `mismatch`."""
         return jax.jacfwd(self.mismatch)(unknowns)
@@ -181,7 +182,7 @@ class Conditions(eqx.Module):
         return tuple(int(i) for i in np.flatnonzero(felt)), np.where(rows > 0.0, rows, 1.0)
 
 
-@eqx.filter_jit
+@compiled
 def _sizes(conditions: Conditions, scale: Array) -> tuple[Float[Array, "s s"], Float[Array, "c s"], Float[Array, " s"]]:
     """Root mean squares of what a state of size `scale` does to each rate and to each output, and of the rates."""
     vehicle, states = conditions.vehicle, conditions.states

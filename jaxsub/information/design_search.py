@@ -10,6 +10,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from ..programs import compiled
 from ..simulation import prbs
 from .design_limits import Bounds
 
@@ -18,7 +19,7 @@ _TOLERANCE = 1e-5
 Loss = Callable[[Array, Any], Array]
 
 
-@eqx.filter_jit
+@compiled
 def descend(
     loss: Loss, begin: Float[Array, "b k m"], args: Any, steps: int
 ) -> tuple[Float[Array, "b k m"], Float[Array, "b steps"]]:

@@ -9,13 +9,13 @@ float type, below the largest. A direction under that is unidentifiable, however
 
 import dataclasses
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..estimate import Problem, Solution
 from ..likelihood import BlockLinearised, Linearised, Watch, nobody
+from ..programs import compiled
 from ..recording.runs import Runs
 from .residual_disturbance import whitened_columns
 
@@ -155,7 +155,7 @@ def _upper(matrix: Float[np.ndarray, "*r n q"]) -> Float[np.ndarray, "*r m q"]:
     return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
-@eqx.filter_jit
+@compiled
 def _block_triangle(problem: Problem, runs: Runs, model: Linearised) -> Float[Array, "r q q"]:
     """R of each run's whitened columns in one block: by its initial state, then by the coefficients."""
     theta, start, _ = whitened_columns(problem, runs, model)

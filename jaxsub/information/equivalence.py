@@ -20,12 +20,12 @@ holds the families. $P$ is the paper's; $T$, $Q$ and the shifts are additions.
 
 import dataclasses
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..programs import compiled
 from ..simulation.synthesis import at_rest
 from ..vehicle import AbstractVehicle
 from .conditions import Change, Conditions, Equivalent
@@ -123,7 +123,7 @@ def _units(conditions: Conditions) -> np.ndarray:
     return np.concatenate([np.where(theta == 0.0, 1.0, theta), between(rms), rms, between(force)])
 
 
-@eqx.filter_jit
+@compiled
 def _flattened(conditions: Conditions, null: Float[Array, "f u"]) -> Float[Array, "f e"]:
     """dθ, dS, c and dT in a row for each vector of the null space, physical units."""
 

@@ -2,13 +2,13 @@
 
 import dataclasses
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ..estimate import Solution
+from ..programs import compiled
 from ..vehicle import AbstractVehicle
 
 # an entry below this part of its row's largest is rounding, and a fin with less of the moment is no way to excite it
@@ -91,7 +91,7 @@ def _in_words(effect: np.ndarray, inputs: list[str]) -> str:
     return " and ".join(along) + (f" against {' and '.join(against)}" if against else "")
 
 
-@eqx.filter_jit
+@compiled
 def _dependence(
     vehicle: AbstractVehicle, at: Float[Array, " z"], scale: Float[Array, " z"]
 ) -> tuple[Float[Array, "p z"], Float[Array, "p n"], Float[Array, "n m"]]:

@@ -7,7 +7,6 @@ $2\,[J(\theta_i) - J(\hat\theta)]$ is $\chi^2_1$ at the true value, so the inter
 import dataclasses
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +16,7 @@ from ..errors import InputError, nearest
 from ..estimate import Problem, Solution, gauss_newton
 from ..estimate.method import costs, holding, lanes_for, objective
 from ..estimate.pool import pool
+from ..programs import compiled
 from ..results import RESULTS
 
 _CHI2 = 3.841458820694124
@@ -81,7 +81,7 @@ def _coordinates(fit: Solution, problem: Problem, theta: np.ndarray) -> Float[Ar
     return rows.at[:, theta.shape[1] :].set(moved.ravel()[: states.size])
 
 
-@eqx.filter_jit
+@compiled
 def _costs(problem: Problem, starts: Float[Array, "g d"], moving: Bool[Array, "g p"]) -> Float[Array, " g"]:
     """The least cost from each start with only the coefficients `moving` free; NaN where the search failed."""
     p, held = moving.shape[1], holding(lambda _: problem, starts, moving)

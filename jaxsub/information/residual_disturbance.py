@@ -26,6 +26,7 @@ from ..likelihood import (
     group_means,
     padded_width,
 )
+from ..programs import compiled
 from ..recording.runs import Runs
 
 # samples that the disturbance of long runs is estimated from: its few numbers gain nothing from more; and of what a
@@ -55,7 +56,7 @@ def residual_disturbance(problem: Problem, model: BlockLinearised, directions: D
     return _estimated(problem, runs, linearised, directions, *averages)
 
 
-@eqx.filter_jit
+@compiled
 def _estimated(
     problem: Problem, runs: Runs, model: Linearised, directions: Directions, *averages: Averages
 ) -> Disturbance:
@@ -103,7 +104,7 @@ def _averages(problem: Problem, model: BlockLinearised, directions: Directions, 
     return Averages.joined(means, int(model.runs.live[chosen].sum()))
 
 
-@eqx.filter_jit
+@compiled
 def _means(
     problem: Problem, runs: Runs, model: Linearised, directions: Directions, groups: int
 ) -> tuple[System, Float[Array, "r j1 c q"]]:

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..arrays import Values
+from ..programs import compiled
 from .disturbance import Columns, Disturbance, System
 from .sensitivity import propagate
 
@@ -62,7 +63,7 @@ class Averages(eqx.Module):
         return Disturbance(disturbance.force * jnp.sqrt(share), disturbance.time, disturbance.noise)
 
 
-@eqx.filter_jit
+@compiled
 def group_means(system: System, shown: Float[Array, "r k c q"], groups: int) -> tuple[System, Float[Array, "r j1 c q"]]:
     """The `groups` groups that the intervals of a block make, as `Averages` has them, and the means of `shown`.
 

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..effects import AbstractActuator, AbstractInstrument
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import measure, sampled_states
 from ..vehicle import AbstractVehicle
@@ -160,7 +161,7 @@ def _block(
     return _summed(vehicle.turning, runs, at, *with_jacobians(vehicle, runs, at), sigma, spread)
 
 
-@eqx.filter_jit
+@compiled
 def _summed(
     turning: tuple[bool, ...],
     runs: Runs,
@@ -183,7 +184,7 @@ def _errors(vehicle: AbstractVehicle, runs: Runs, state: Array, turns: Array) ->
     return _left(vehicle.turning, runs, states, measure(vehicle, runs, states), turns)
 
 
-@eqx.filter_jit
+@compiled
 def _left(
     turning: tuple[bool, ...], runs: Runs, states: Array, modelled: Array, turns: Array
 ) -> tuple[Array, Array, Array]:
@@ -202,7 +203,7 @@ def _blocks(runs: Runs, length: int, watch: Watch) -> Iterator[Runs]:
         watch(min(1.0, (begin + length) / last))
 
 
-_cut = eqx.filter_jit(Runs.block)
+_cut = compiled(Runs.block)
 
 
 def _joined(parts: list[Array], samples: int, length: int) -> Array:

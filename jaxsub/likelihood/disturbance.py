@@ -22,6 +22,7 @@ from jax.scipy.linalg import solve_triangular
 from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values, namespace
+from ..programs import compiled
 from ..recording.runs import Runs
 from .innovation_products import Steps, beyond, innovation_products, passes, products_by_part
 from .sensitivity import Jacobians, Linearised, propagate
@@ -98,7 +99,7 @@ class Columns(eqx.Module):
         return jax.tree.map(pad, self)
 
 
-@eqx.filter_jit
+@compiled
 def first_guess(system: System, residual: Float[Array, "r k c"]) -> Disturbance:
     """Where to start looking: in each equation a force whose lasting effect is as large as the `residual`."""
     n, r = system.G.shape[3] // 2, len(system.intervals)
@@ -122,7 +123,7 @@ def restricted(gram: Float[Array, "q q"], spread: Float[Array, ""]) -> Float[Arr
     return spread + jnp.sum(jnp.log(jnp.diagonal(among))) + 0.5 * (gram[0, 0] - explained @ explained)
 
 
-@eqx.filter_jit
+@compiled
 def whitened(
     disturbance: Disturbance, system: System, columns: Columns
 ) -> tuple[Float[Array, "r k c q"], Float[Array, "r k c c"]]:
@@ -143,7 +144,7 @@ def part_products(
     return np.asarray(found)[..., :count, :count], np.asarray(spreads)
 
 
-@eqx.filter_jit
+@compiled
 def total_products(
     disturbance: Disturbance, system: System, columns: Columns
 ) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
@@ -162,7 +163,7 @@ def padded_width(count: int) -> int:
     return 3 * power // 4 if count <= 3 * power // 4 and power > 16 else power
 
 
-@eqx.filter_jit
+@compiled
 def _part_products(
     disturbance: Disturbance, system: System, columns: Columns, parts: int
 ) -> tuple[Float[Array, "r m q q"], Float[Array, "r m"]]:
@@ -324,7 +325,7 @@ def _correlated(
     return jax.vmap(run)(jnp.exp(-intervals[..., None] / time), values)
 
 
-@eqx.filter_jit
+@compiled
 def smoothed(
     disturbance: Disturbance, system: System, column: Columns
 ) -> tuple[Float[Array, "r k n"], Float[Array, "r k n"]]:

@@ -17,6 +17,7 @@ from jax.scipy.linalg import cho_solve
 from jaxtyping import Array, Float
 
 from ..effects import AbstractSensor
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import Sampled
 from ..vehicle import AbstractVehicle
@@ -68,7 +69,7 @@ def follow(
     return Followed(expected, filtered, force, system, residual, theta, products, logarithm)
 
 
-@eqx.filter_jit
+@compiled
 def _columns(
     turning: tuple[bool, ...],
     runs: Runs,
@@ -91,7 +92,7 @@ def _columns(
     return System.of(by, runs, sigma, spread), residual, theta, whole
 
 
-@eqx.filter_jit
+@compiled
 def _path(
     vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, spread: Array
 ) -> tuple[Float[Array, "r k s"], Float[Array, "r k s"], Float[Array, "r k n"], Float[Array, "r k1 2 n"]]:

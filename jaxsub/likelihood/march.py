@@ -16,6 +16,7 @@ from jax.custom_batching import custom_vmap
 from jaxtyping import Array, Float
 
 from ..errors import InputError
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import Sampled
 from ..vehicle import AbstractVehicle
@@ -148,7 +149,7 @@ def _seen(runs: Runs, sigma: Array) -> Float[Array, "1 r k q"]:
     return jnp.concatenate([runs.times[..., None], runs.signals, runs.outputs, weight], axis=-1)[None]
 
 
-@eqx.filter_jit
+@compiled
 def _looked_at(vehicle_at: VehicleAt, y: Array, runs: Runs) -> tuple[Sampled, Array, Array, Array]:
     """The model at coordinates, the derivatives of its numbers by them, the signals that it is driven by.
 

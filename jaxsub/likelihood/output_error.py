@@ -4,11 +4,11 @@ $-\ln p(Z\mid\theta, x_0) = \tfrac12\sum_{r,k,c} m_{rkc}\,(z_{rkc} - \hat y_{rkc
 + \sum_c N_c\ln\sigma_c$, with m the mask, one free initial state a run, and $\sigma$ given or concentrated out.
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import simulate
 from ..vehicle import AbstractVehicle
@@ -32,7 +32,7 @@ def residual_outputs(
     return wrapped_errors(vehicle.turning, runs, modelled, turns)
 
 
-@eqx.filter_jit
+@compiled
 def wrapped_errors(
     turning: tuple[bool, ...],
     runs: Runs,

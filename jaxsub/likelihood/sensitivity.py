@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import Sampled, sampled_states
 from ..vehicle import AbstractVehicle
@@ -77,7 +78,7 @@ class Jacobians(eqx.Module):
 
 
 # one program of it for whatever linearises a model: derivatives are most of what a model's programs take to compile
-@eqx.filter_jit
+@compiled
 def jacobians(
     vehicle: AbstractVehicle,
     runs: Runs,
@@ -174,7 +175,7 @@ def with_jacobians(vehicle: AbstractVehicle, runs: Runs, at: Checkpoint) -> tupl
     return states, jacobians(vehicle, runs, states, states, unforced)
 
 
-@eqx.filter_jit
+@compiled
 def along(
     turning: tuple[bool, ...], runs: Runs, at: Checkpoint, states: Array, by: Jacobians
 ) -> tuple[Linearised, Checkpoint]:
@@ -189,7 +190,7 @@ def along(
     return Linearised(states, error, by.A, by.G, by.C, theta, start), after
 
 
-@eqx.filter_jit
+@compiled
 def force_columns(
     model: Linearised, start_force: Float[Array, "r k1 n q"], end_force: Float[Array, "r k1 n q"]
 ) -> Float[Array, "r k c q"]:

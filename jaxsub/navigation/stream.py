@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from ..filter import AbstractFilter, AbstractGate, Estimate, FilterState, InnovationGate, Open, Sample, select
+from ..programs import compiled
 
 
 class Reading(eqx.Module):
@@ -226,7 +227,7 @@ class Stream(AbstractStream):
         return jnp.any(jnp.stack(jax.tree.leaves(stuck)))
 
 
-@eqx.filter_jit
+@compiled
 def follow(stream: AbstractStream, state: Any, readings: Any) -> tuple[Any, Any]:
     """The state after K readings, stacked, and what was known after each; `jax.vmap` over many recordings."""
     return jax.lax.scan(lambda state, reading: stream.step(state, reading), state, readings)

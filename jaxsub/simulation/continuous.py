@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import stack
@@ -33,7 +34,7 @@ def _rates(t: Any, state: Array, interval: _Interval) -> Array:
     return jnp.concatenate([inverse @ (vehicle.force(motion) + vehicle.damping_matrix() @ velocity), moved])
 
 
-@eqx.filter_jit
+@compiled
 def integrate(
     vehicle: AbstractVehicle,
     runs: Runs,

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import stack
@@ -106,13 +107,13 @@ def simulate(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -
 
 
 # whatever asks for a trajectory has this program of it, since a loop over samples takes long to compile
-@eqx.filter_jit
+@compiled
 def sampled_states(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
     """States at the samples of `runs` by the sampled step; `integrate` gives them by the continuous model."""
     return Sampled.of(vehicle, runs).states(runs, start)
 
 
-@eqx.filter_jit
+@compiled
 def measure(vehicle: AbstractVehicle, runs: Runs, states: Float[Array, "r k s"]) -> Float[Array, "r k c"]:
     """What the sensors show along `states`; the actuators' own dynamics are seen only through what they did."""
     return vehicle.measure(runs.times, states, runs.signals)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Array
 
 from ..effects import Motion
+from ..programs import compiled
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 
@@ -39,7 +40,7 @@ class Trajectory(eqx.Module):
         return cls(*(jax.tree.map(np.asarray, part) for part in (*found, runs.times, steps)))
 
 
-@eqx.filter_jit
+@compiled
 def _trajectory(vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered: Array) -> tuple:
     nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
     start = vehicle.motion(filtered[:, :-1], nodes[:, :, 0])
