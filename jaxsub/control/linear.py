@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..errors import InputError
+from ..methods import jittable
 from ..programs import compiled
 from ..vehicle.base import stack
 from .plant import Jacobians, Plant, Time
@@ -36,11 +37,13 @@ class LinearPlant(eqx.Module):
     inputs: tuple[str, ...] = eqx.field(static=True)
     outputs: tuple[str, ...] = eqx.field(static=True)
 
+    @jittable
     def step(self, x: Float[Array, " s"], u: Float[Array, " m"]) -> Float[Array, " s"]:
         """The next state by the linear model; of a continuous one the rate."""
         moved = self.A @ (x - self.x) + self.B @ (u - self.u) + self.drift
         return moved + self.x if self.dt else moved
 
+    @jittable
     def output(self, x: Float[Array, " s"], u: Float[Array, " m"]) -> Float[Array, " c"]:
         """The outputs by the linear model."""
         return self.y + self.C @ (x - self.x) + self.D @ (u - self.u)

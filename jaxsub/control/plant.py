@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, AbstractSensor
 from ..errors import InputError, require_known
 from ..filter.model import linearised
+from ..methods import jittable
 from ..programs import compiled
 from ..simulation import Sampled, step_table
 from ..simulation.exponential import StepTable
@@ -83,12 +84,14 @@ class Plant(eqx.Module):
         sampled = _ready(self.vehicle.with_values(dict(values)), self.dt, self.sampled.substeps)
         return dataclasses.replace(self, sampled=sampled)
 
+    @jittable
     def start(self, state: Float[Array, " n"], inputs: Float[Array, " m"], time: Time = 0.0) -> Float[Array, " s"]:
         """The plant's state where the vehicle's is `state`, and inputs and outputs have long been what they are."""
         signals = self._signals(inputs)
         kept = self._actuate(None, self._nodes(signals, time))[1] | self._shown(None, state, signals, time)[1]
         return jnp.concatenate([state, *[kept[i] for i in sorted(kept)]]).astype(state.dtype)
 
+    @jittable
     def step(self, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> Float[Array, " s"]:
         """The state one sample later; `time` is that of the sample, s."""
         state, memory = self._split(x)
@@ -98,6 +101,7 @@ class Plant(eqx.Module):
         after = self.sampled.step(state, nodes, jnp.asarray(0))
         return jnp.concatenate([after, *[kept[i] for i in sorted(kept)]])
 
+    @jittable
     def output(self, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> Float[Array, " c"]:
         """What the sensors show, without noise, in SI."""
         state, memory = self._split(x)
@@ -109,6 +113,7 @@ class Plant(eqx.Module):
         signals = self._nodes(self._signals(u), time)[0]
         return self.vehicle.channels(self.vehicle.motion(x[: self.own], signals))
 
+    @jittable
     def jacobians(self, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> Jacobians:
         """Derivatives of `step` and `output` by state and input."""
         _, A, B = linearised(lambda x, u: self.step(x, u, time), x, u)
@@ -119,6 +124,7 @@ class Plant(eqx.Module):
         """All signals and the time as they act on the vehicle where the inputs have long been `u`."""
         return self._actuate(None, self._nodes(self._signals(u), time))[0][0]
 
+    @jittable
     def run(self, x: Float[Array, " s"], inputs: Float[Array, "k m"], time: Time = 0.0) -> Float[Array, "k1 s"]:
         """The states from `x` on under `inputs`, one more than there are of these."""
 

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jax.scipy.linalg import block_diag
 from jaxtyping import Array, Bool, Float, Int
 
+from ..methods import jittable
 from .form import AbstractForm, SquareRoot
 from .gate import AbstractGate, Open
 from .model import AbstractProcess, Sample, linearised, select
@@ -120,6 +121,7 @@ class AbstractFilter(eqx.Module):
         begun = FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, outside, refused, diverged)
         return _strong(begun)
 
+    @jittable
     def step(self, state: FilterState, sample: Sample) -> tuple[FilterState, Estimate]:
         """The next state and what is known after `sample`."""
         memory, root = self.noise(state.memory, state.residuals, sample.elapsed)

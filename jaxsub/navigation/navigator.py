@@ -6,6 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..filter import AbstractFilter, Estimate, FilterState
+from ..methods import jittable
 from .attitude import Gyro
 from .constructed import ConstructedAttitude, ConstructedAttitudeStream, Limits, standard_deviations
 from .position import Course
@@ -86,6 +87,7 @@ class PaperNavigator(AbstractStream):
             self.position.start(position, Reading(like.time, course, angles, none)),
         )
 
+    @jittable
     def step(self, state: NavigatorState, reading: FlightReading) -> tuple[NavigatorState, Navigated]:
         """The next state and what is known after `reading`."""
         tick = state.attitude.clock.tick(reading.time, self.attitude.patience)

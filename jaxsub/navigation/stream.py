@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PyTree
 
 from ..filter import AbstractFilter, AbstractGate, Estimate, FilterState, InnovationGate, Open, Sample, select
+from ..methods import jittable
 from ..programs import compiled
 
 
@@ -178,6 +179,7 @@ class Stream(AbstractStream):
         clock = Clock(jnp.zeros_like(like.time), jnp.zeros((), bool), jnp.zeros((), jnp.int32))
         return StreamState(state, clock, inputs, jnp.zeros(like.mask.shape, bool), Faults.none(like.mask.size))
 
+    @jittable
     def step(self, state: StreamState, reading: Reading) -> tuple[StreamState, Estimate]:
         """The next state and what is known after `reading`; for one passed over, what was known before."""
         tick = state.clock.tick(reading.time, self.patience)

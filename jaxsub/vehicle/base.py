@@ -21,6 +21,7 @@ from ..effects import (
     parameter_table,
     with_numbers,
 )
+from ..methods import jittable
 from .description import described
 from .layout import Layout
 from .sensors.output import SPECIFIC_FORCE
@@ -148,6 +149,7 @@ class AbstractVehicle(eqx.Module):
                 rates = rates | effect.memory_rates(motion)
         return rates
 
+    @jittable
     def force(self, motion: Motion) -> Float[Array, "*k n"]:
         """All generalised forces (N, N m) other than linear damping, effects included."""
         total = self.own_force(motion)
@@ -174,12 +176,14 @@ class AbstractVehicle(eqx.Module):
                 signals = signals.at[..., column].set(self.sensors.true(name, signals[..., column]))
         return signals
 
+    @jittable
     def acceleration(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Float[Array, "*k n"]:
         r"""$\dot\nu$ of the free equations (m/s², rad/s²)."""
         n = len(self.layout.equations)
         force = self.force(self.motion(state, signals)) + state[..., :n] @ self.damping_matrix().T
         return force @ jnp.linalg.inv(self.mass_matrix()).T
 
+    @jittable
     def measure(
         self, times: Float[Array, " *k"], state: Float[Array, "*k s"], signals: Float[Array, "*k m"]
     ) -> Float[Array, "*k c"]:

@@ -57,6 +57,17 @@ def test_many_recordings_at_once_are_each_of_them():
         same(at(many, number), follow(stream, state, record)[1], atol=1e-13)
 
 
+def test_a_step_is_compiled_by_jax_jit():
+    """Claim: `jax.jit(stream.step)` takes the method as it is, and says what the scanned step does."""
+    readings = gentle_readings(4)
+    stream = attitude_stream()
+    state = started(stream, readings)
+    step, last = jax.jit(stream.step), follow(stream, state, readings)[0]
+    for k in range(4):
+        state, _ = step(state, at(readings, k))
+    same(state, last, atol=1e-13)
+
+
 NAN3 = jnp.full(3, jnp.nan)
 PASSED_OVER = {
     "untimed": {"time": jnp.asarray(jnp.nan)},
