@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .api.diagnoses import Diagnosis, diagnose
     from .api.fits import Fit, fit, identifiability
     from .api.simulations import Simulation, simulate
+    from .api.sweeps import Sweep, sweep
     from .checks import check
     from .control import Mpc, Plant, discretise, linearise, trim
     from .effects import vocabulary
@@ -33,6 +34,7 @@ __all__ = [
     "Recording",
     "Selection",
     "Simulation",
+    "Sweep",
     "__version__",
     "check",
     "diagnose",
@@ -51,6 +53,7 @@ __all__ = [
     "save",
     "simulate",
     "split",
+    "sweep",
     "synthetic",
     "three_two_one_one",
     "trim",
@@ -65,6 +68,7 @@ _NAMES = {
     "api.diagnoses": "Diagnosis diagnose",
     "api.fits": "Fit fit identifiability",
     "api.simulations": "Simulation simulate",
+    "api.sweeps": "Sweep sweep",
     "checks": "check",
     "control": "Mpc Plant discretise linearise trim",
     "effects": "vocabulary",

@@ -18,7 +18,8 @@ class _Jittable:
 
     def __init__(self, function: Callable[..., Any]):
         self.function = function
-        functools.update_wrapper(self, function)
+        wrapper: Any = self
+        functools.update_wrapper(wrapper, function)
 
     def __get__(self, module: Any, owner: type | None = None) -> Any:
         return self.function if module is None else Partial(self.function, module)
