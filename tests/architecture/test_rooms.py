@@ -14,9 +14,9 @@ FILES = sorted(HOUSE.rglob("*.py"))
 # design.md, with effects before vehicle, which has them built in
 ORDER = (
     "errors", "findings", "plain", "fingerprint", "programs", "storage", "unit_names", "units", "arrays", "methods",
-    "parameters", "results", "symbolic", "recording", "effects", "sensors", "vehicle", "simulation", "filter", "navigation",
-    "likelihood", "estimate", "information", "checks", "discrepancy", "control", "sweeps", "report", "api",
-    "cli", "__main__",
+    "parameters", "results", "symbolic", "recording", "effects", "sensors", "vehicle", "simulation", "filter",
+    "navigation", "likelihood", "estimate", "information", "checks", "discrepancy", "control", "sweeps", "report",
+    "api", "cli", "__main__",
 )  # fmt: skip
 
 
