@@ -147,6 +147,19 @@ def simulate(vehicle: Path, run: Path, out: Path, start: Any, columns: Path | No
 
 
 @app.command()
+@click.argument("log", type=_PATH)
+@click.option("--sensors", type=_PATH, required=True, help="A TOML file that describes the sensors.")
+@_out(required=True)
+@_overwrite
+@common
+def navigate(log: Path, sensors: Path, out: Path, overwrite: bool) -> None:
+    """Attitude, velocity and position with standard deviations, from the raw sensors of a log."""
+    from . import navigate as command
+
+    command.run(log, sensors, out, overwrite)
+
+
+@app.command()
 @click.argument("kind", type=click.Choice(KINDS), required=False)
 @dimensions
 @click.option("--like", type=click.Choice(PUBLISHED), help="A published vehicle in place of a kind.")

@@ -13,6 +13,7 @@ from .noise import AbstractNoiseRule, ConstantNoise, Innovation, Residuals
 from .passes import Identified, identify, over_runs
 from .regression import FuzzyLine, fuzzy_line
 from .rules import InnovationNoise, RandomNoise, SageHusaNoise
+from .smoother import Smoothed, last, smooth_block
 from .vehicle import Drive, VehicleProcess, samples
 
 __all__ = [
@@ -43,15 +44,18 @@ __all__ = [
     "Residuals",
     "SageHusaNoise",
     "Sample",
+    "Smoothed",
     "SquareRoot",
     "VehicleProcess",
     "fuzzy_line",
     "identify",
+    "last",
     "linearised",
     "on_line",
     "over_runs",
     "samples",
     "select",
+    "smooth_block",
     "state_scale",
     "vehicle_filter",
 ]

@@ -121,9 +121,8 @@ class AbstractFilter(eqx.Module):
         begun = FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, outside, refused, diverged)
         return _strong(begun)
 
-    @jittable
-    def step(self, state: FilterState, sample: Sample) -> tuple[FilterState, Estimate]:
-        """The next state and what is known after `sample`."""
+    def before(self, state: FilterState, sample: Sample) -> tuple[FilterState, Innovation, Float[Array, "s m"]]:
+        """The state at `sample` before it is corrected, what the sample shows, and a root of the noise on the way."""
         memory, root = self.noise(state.memory, state.residuals, sample.elapsed)
         moves = sample.elapsed > 0.0
         driven = self.process.driven(state.x, state.theta, sample, root)
@@ -138,6 +137,17 @@ class AbstractFilter(eqx.Module):
             memory, more = surprise
             before = dataclasses.replace(self.widened(before, more), memory=memory)
             G = jnp.concatenate([G, more], axis=1)
+        return before, seen, G
+
+    @jittable
+    def step(self, state: FilterState, sample: Sample) -> tuple[FilterState, Estimate]:
+        """The next state and what is known after `sample`."""
+        return self.corrected(state, *self.before(state, sample))
+
+    def corrected(
+        self, state: FilterState, before: FilterState, seen: Innovation, G: Float[Array, "s m"]
+    ) -> tuple[FilterState, Estimate]:
+        """The next state and what is known, of the `state` before a sample and what `before` made of both."""
         after, factor = self.correct(before, seen)
         finite = jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(after)])
         sound = jnp.all(finite) & ~state.diverged

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax.scipy.linalg import block_diag
 from jaxtyping import Array, Bool, Float
 
-from .small import times
+from .small import cholesky, times
 from .square_root import by_qr, by_svd, covariance_update, stacked, update
 
 
@@ -22,6 +22,10 @@ class AbstractForm(eqx.Module):
     @abc.abstractmethod
     def covariance(self, kept: Float[Array, "n n"]) -> Float[Array, "n n"]:
         """The covariance that `kept` stands for."""
+
+    @abc.abstractmethod
+    def factor(self, kept: Float[Array, "n n"]) -> Float[Array, "n n"]:
+        """The lower-triangular root of P."""
 
     @abc.abstractmethod
     def deviations(self, kept: Float[Array, "n n"]) -> Float[Array, " n"]:
@@ -59,6 +63,10 @@ class SquareRoot(AbstractForm):
         """J Jᵀ."""
         return times(kept, kept.T)
 
+    def factor(self, kept: Float[Array, "n n"]) -> Float[Array, "n n"]:
+        """J made triangular."""
+        return by_qr(kept)
+
     def deviations(self, kept: Float[Array, "n n"]) -> Float[Array, " n"]:
         """Lengths of the rows of J."""
         return jnp.linalg.norm(kept, axis=1)
@@ -94,6 +102,10 @@ class Covariance(AbstractForm):
     def covariance(self, kept: Float[Array, "n n"]) -> Float[Array, "n n"]:
         """P itself."""
         return kept
+
+    def factor(self, kept: Float[Array, "n n"]) -> Float[Array, "n n"]:
+        """Cholesky's factor."""
+        return cholesky(kept)
 
     def deviations(self, kept: Float[Array, "n n"]) -> Float[Array, " n"]:
         """Roots of the diagonal of P."""

@@ -10,6 +10,7 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.typing import DTypeLike
 from jaxtyping import Array, Float
 
 from ..effects import GRAVITY
@@ -80,14 +81,17 @@ class StrapdownNavigation(AbstractProcess):
         """The rotation between the two, and the differences of the rest."""
         return jnp.concatenate([logarithm(product(x[:4], conjugate(origin[:4]))), x[4:] - origin[4:]])
 
+    def gravity(self, dtype: DTypeLike) -> Float[Array, "3"]:
+        """North, east, down, m/s²."""
+        return jnp.array([0.0, 0.0, GRAVITY], dtype)
+
     def step(self, x: Float[Array, "16"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, "16"]:
         """Readings taken as constant over the interval; the velocity turned at its middle."""
         q, v, p, gyro_bias, bias = x[:4], x[4:7], x[7:10], x[10:13], x[13:]
         T = sample.elapsed
         turn = (sample.inputs.gyro - gyro_bias) * T
         half = product(q, exponential(turn / 2.0))
-        gravity = jnp.array([0.0, 0.0, GRAVITY], x.dtype)
-        acceleration = matrix(half) @ (sample.inputs.accelerometer - bias) + gravity
+        acceleration = matrix(half) @ (sample.inputs.accelerometer - bias) + self.gravity(x.dtype)
         q = normalised(product(q, exponential(turn)))
         return jnp.concatenate([q, v + T * acceleration, p + T * (v + T * acceleration / 2.0), x[10:]])
 
@@ -112,8 +116,16 @@ class StrapdownNavigation(AbstractProcess):
         """
         since = (sample.inputs.gyro - x[10:13]) * self.sensors.magnetic_delay
         R = matrix(product(x[:4], exponential(-since)))
-        held = jax.lax.stop_gradient(R)
-        seen = held @ sample.inputs.magnetometer
-        north, east, _ = R @ (held.T @ (seen * jnp.array([1.0, 1.0, 0.0], x.dtype)))
-        heading = -angle(north, east)
-        return jnp.concatenate([x[7:10], x[4:7], (heading / self.field.heading_std(seen))[None]])
+        heading = field_heading(R, sample.inputs.magnetometer, self.field)
+        return jnp.concatenate([x[7:10], x[4:7], -heading[None]])
+
+
+def field_heading(R: Float[Array, "3 3"], magnetometer: Float[Array, "3"], field: MagneticField) -> Float[Array, ""]:
+    """The heading of a field that was read in body axes of attitude R, in terms of its standard deviation.
+
+    It changes with the attitude's turn about the vertical alone.
+    """
+    held = jax.lax.stop_gradient(R)
+    seen = held @ magnetometer
+    north, east, _ = R @ (held.T @ (seen * jnp.array([1.0, 1.0, 0.0], seen.dtype)))
+    return angle(north, east) / field.heading_std(seen)

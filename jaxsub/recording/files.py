@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxsub.errors import InputError, OutputError
 from jaxsub.recording.archive import MARK, extracted, split_member
-from jaxsub.recording.frames import recorded, to_pandas, to_xarray
+from jaxsub.recording.frames import recorded, recorded_in_order, to_pandas, to_xarray
 from jaxsub.recording.layout import with_brackets
 from jaxsub.recording.logs import SUFFIXES, Channel, Listing, Selection, load_log
 from jaxsub.recording.logs import contents as contents_of_log
@@ -44,7 +44,7 @@ def load(
     holds.
     """
     path = Path(path)
-    if path.suffix.lower() in SUFFIXES or _is_bag(path):
+    if is_log(path):
         if columns is None:
             what = "is a log of many channels"
             raise InputError(str(path), what, f"say which to take by --columns; `jaxsub channels {path}` lists them")
@@ -55,6 +55,20 @@ def load(
     return recorded(found.table, name, source, found.first_row, found.findings)
 
 
+def load_in_order(path: str | os.PathLike[str]) -> Recording:
+    """The file of a recording, as `load` reads it, without the fewest rows that leave its times in order.
+
+    A warning in its findings counts them. Raises InputError as `load` does, and where less than half would be left.
+    """
+    found, name, source = read(Path(path))
+    return recorded_in_order(found.table, name, source, found.first_row, found.findings)
+
+
+def is_log(path: Path) -> bool:
+    """Whether a path leads to a vehicle's log, by its suffix, and not to the file of a recording."""
+    return path.suffix.lower() in SUFFIXES or _is_bag(path)
+
+
 def contents(path: str | os.PathLike[str]) -> Listing:
     """What a log or the file of a recording holds: name, unit where it states one, and number of samples.
 
@@ -62,7 +76,7 @@ def contents(path: str | os.PathLike[str]) -> Listing:
     what of an incomplete log is lost. Raises InputError for a file that cannot be read.
     """
     path = Path(path)
-    if path.suffix.lower() in SUFFIXES or _is_bag(path):
+    if is_log(path):
         return contents_of_log(path)
     listed, found = [], read(path)[0]
     for header, values in found.table:

@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxsub.errors import InputError, nearest
 from jaxsub.findings import Finding
+from jaxsub.recording.order import disorder, in_order
 from jaxsub.recording.recording import FIRST_ROW, Recording, check_column
 from jaxsub.units import TIME, column_to_si, split_header
 
@@ -74,6 +75,25 @@ def to_xarray(recording: Recording, units: Mapping[str, str] | None = None) -> "
             raise InputError(f"column {name!r}", "is a name that NetCDF cannot hold", "rename it or write a .csv file")
         dataset[name] = xarray.Variable(TIME, values, {"units": unit} if unit else {})
     return dataset
+
+
+def recorded_in_order(
+    table: Table, name: str, source: str, first_row: int = FIRST_ROW, findings: tuple[Finding, ...] = ()
+) -> Recording:
+    """As `recorded`, without the fewest rows that leave times in order; a finding says how many and why.
+
+    Raises InputError as `recorded` does, and where less than half of the rows would be left.
+    """
+    header = next((header for header, _ in table if split_header(header)[0] == TIME), None)
+    if header is None:
+        return recorded(table, name, source, first_row, findings)
+    times, _ = _in_si(source, [header], dict(table), first_row)
+    kept = in_order(times)
+    if len(kept) == len(times):
+        return recorded(table, name, source, first_row, findings)
+    found = disorder(source, times, kept, first_row)
+    rows: Table = [(header, values[kept] if isinstance(values, np.ndarray) else values) for header, values in table]
+    return recorded(rows, name, source, first_row, (*findings, found))
 
 
 def recorded(

@@ -1,0 +1,69 @@
+"""`jaxsub navigate`: attitude, velocity and position with standard deviations from raw sensors."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from ..navigation.navigate import Navigation, navigate
+from ..navigation.recorded import recording_of, summary
+from ..navigation.suite import read_sensors
+from ..navigation.suite.log import load_sensors
+from ..plain import to_json
+from ..recording import save
+from . import session, terminal
+from .effort import TimeLeft
+from .output import fresh_folder, paths_of
+
+_STEPS = "filtering and smoothing"
+
+
+def run(log_path: Path, sensors_path: Path, out: Path, overwrite: bool) -> None:
+    """Navigate by the log; write `navigation.parquet`, `filtered.parquet` and `navigation.json` into `out`."""
+    session.start()
+    with fresh_folder(out, overwrite, paths_of(log_path, sensors_path)) as folder:
+        suite = read_sensors(sensors_path)
+        log = load_sensors(log_path, suite)
+        terminal.warn(log.findings)
+        with terminal.progress(f"navigating by {suite.name}") as told:
+            told(_STEPS)
+            found = navigate(log, suite, TimeLeft(told, _STEPS))
+        terminal.warn(found.rows.findings)
+        content = summary(found)
+        terminal.emit(content, lambda: _show(content))
+        with terminal.progress("writing") as told:
+            told("recordings")
+            _write(found, content, folder)
+
+
+def _write(found: Navigation, content: dict[str, Any], folder: Path) -> None:
+    save(recording_of(found, found.smoothed), folder / "navigation.parquet")
+    save(recording_of(found, found.filtered), folder / "filtered.parquet")
+    (folder / "navigation.json").write_text(to_json(content), encoding="utf-8")
+
+
+def _show(content: dict[str, Any]) -> None:
+    terminal.table(
+        ("channel", "σ, median", "σ, largest", "unit"),
+        [(name, *_shown(row["unit"], row["median"], row["largest"])) for name, row in content["sigma"].items()],
+    )
+    terminal.table(
+        ("sensor", "measurements", "rejected", "NIS (95 % band)", "correlation (bound)", "verdict"),
+        [_sensor_row(row) for row in content["sensors"]],
+    )
+    terminal.table(
+        ("constant", "value", "± 1 σ", "unit"),
+        [(n, f"{r['value']:.3g}", f"{r['standard_error']:.2g}", r["unit"]) for n, r in content["constants"].items()],
+    )
+    for sentence in content["unobserved"]:
+        terminal.say(sentence)
+
+
+def _shown(unit: str, *values: float) -> tuple[str, ...]:
+    turn = math.degrees(1.0) if unit == "rad" else 1.0
+    return (*(f"{turn * value:.3g}" for value in values), "°" if unit == "rad" else unit)
+
+
+def _sensor_row(row: dict[str, Any]) -> tuple[str, ...]:
+    nis = f"{row['nis']:.2f} ({row['low']:.2f} to {row['high']:.2f})"
+    correlation = f"{row['correlation']:.2f} (±{row['bound']:.2f})"
+    return row["name"], str(row["measurements"]), str(row["rejected"]), nis, correlation, row["verdict"]

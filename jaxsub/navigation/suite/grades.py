@@ -1,0 +1,38 @@
+"""Grades of inertial sensors, in round numbers of their data sheets.
+
+Source: Groves (2013), Principles of GNSS, inertial and multisensor integrated navigation systems, §4.4.
+"""
+
+import math
+from typing import NamedTuple
+
+_DEGREE, _MILLI_G = math.radians(1.0), 9.80665e-3
+
+
+class Grade(NamedTuple):
+    """How far a triad of inertial sensors errs, SI.
+
+    **Fields**
+
+    - `density`: white noise, rad/s/√Hz or m/s²/√Hz. `bias`: standard deviation at switch-on, rad/s or m/s².
+    - `wander`: random walk of the bias, its unit a root second. `scale_error`: standard deviation of each axis.
+    """
+
+    density: float
+    bias: float
+    wander: float
+    scale_error: float
+
+
+GRADES: dict[str, dict[str, Grade]] = {
+    "gyro": {
+        "consumer": Grade(0.01 * _DEGREE, 1.0 * _DEGREE, 1e-5, 5e-3),
+        "industrial": Grade(0.005 * _DEGREE, 0.2 * _DEGREE, 2e-6, 1e-3),
+        "tactical": Grade(0.002 * _DEGREE, 10.0 * _DEGREE / 3600.0, 1e-7, 3e-4),
+    },
+    "accelerometer": {
+        "consumer": Grade(1e-2, 10.0 * _MILLI_G, 1e-4, 5e-3),
+        "industrial": Grade(1e-3, 3.0 * _MILLI_G, 1e-5, 1e-3),
+        "tactical": Grade(5e-4, 1.0 * _MILLI_G, 2e-6, 3e-4),
+    },
+}
