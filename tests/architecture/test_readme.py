@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import jaxsub
 from experiments import tables as tables_of
 from jaxsub.cli.app import app
 
@@ -130,7 +131,7 @@ def test_tables_are_made_of_committed_results(page):
 
 
 def calls():
-    """Calls by a name that a block of Python imports from jaxsub, with what the name is."""
+    """Calls of what a block of Python imports from jaxsub, or takes from `js`, with what is called."""
     for block in re.findall(r"^```python\n(.*?)^```", README, re.MULTILINE | re.DOTALL):
         tree = ast.parse(block)
         imported = {
@@ -139,9 +140,14 @@ def calls():
             if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("jaxsub")
             for alias in node.names
         }
+        imported |= {f"js.{name}": getattr(jaxsub, name) for name in jaxsub.__all__ if f"js.{name}(" in block}
         for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in imported:
-                yield pytest.param(imported[node.func.id], node, id=ast.unparse(node))
+            if isinstance(node, ast.Call) and (called := imported.get(ast.unparse(node.func))) is not None:
+                yield pytest.param(called, node, id=ast.unparse(node))
+
+
+def test_python_calls_the_front_door():
+    assert {"js.fit", "js.diagnose", "js.simulate"} <= {param.id.partition("(")[0] for param in calls()}
 
 
 @pytest.mark.parametrize(("called", "call"), list(calls()))

@@ -4,7 +4,9 @@ import dataclasses
 import html
 import json
 import math
+import re
 import tomllib
+from pathlib import Path
 
 import click
 import jax.numpy as jnp
@@ -123,3 +125,21 @@ def test_the_front_door_hands_over_what_the_command_does(tmp_path, monkeypatch, 
     assert found.plot() == found.plot("scan") == "the scan"
     with pytest.raises(js.InputError, match="there is no figure 'none'"):
         found.plot("none")
+
+
+def test_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    """Claim: on a vehicle file and three runs the block prints a fit and the diagnosis, and saves the latter."""
+    write_rig(tmp_path)
+    for index, end in enumerate((12.0, 11.0, 10.0), start=1):
+        js.save(js.load(tmp_path / "run.csv").between(0.0, end), tmp_path / f"run{index}.csv")
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    made = diagnosis("named", samples=40)
+    monkeypatch.setattr("jaxsub.api.diagnoses.conclude", lambda vehicle, *_, **options: (made, vehicle))
+    monkeypatch.setattr("jaxsub.report.write_report", lambda *_: None)
+    monkeypatch.chdir(tmp_path)
+    exec(block, {})
+    said = capsys.readouterr().out
+    assert "The fit explains these runs" in said and "identified" in said and made.summary in said
+    assert (tmp_path / "result" / "improved.toml").exists()
+    assert len(block.splitlines()) <= 15
