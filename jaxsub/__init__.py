@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .api.diagnoses import Diagnosis, diagnose
     from .api.fits import Fit, fit, identifiability
     from .api.simulations import Simulation, simulate
+    from .api.states import States, estimate_states
     from .api.sweeps import Sweep, sweep
     from .checks import check
     from .control import Mpc, Plant, discretise, linearise, trim
@@ -34,12 +35,14 @@ __all__ = [
     "Recording",
     "Selection",
     "Simulation",
+    "States",
     "Sweep",
     "__version__",
     "check",
     "diagnose",
     "discretise",
     "doublet",
+    "estimate_states",
     "fit",
     "from_pandas",
     "from_xarray",
@@ -68,6 +71,7 @@ _NAMES = {
     "api.diagnoses": "Diagnosis diagnose",
     "api.fits": "Fit fit identifiability",
     "api.simulations": "Simulation simulate",
+    "api.states": "States estimate_states",
     "api.sweeps": "Sweep sweep",
     "checks": "check",
     "control": "Mpc Plant discretise linearise trim",

@@ -20,11 +20,12 @@ from ..estimate import (
     Solution,
     assess,
     batch,
+    posterior,
     require_free,
 )
 from ..estimate import fit as solve
 from ..findings import Finding
-from ..information import Coloured, Estimate, Identifiability, coloured_covariance, estimates
+from ..information import Coloured, Estimate, Identifiability, Profile, coloured_covariance, estimates, profile
 from ..information import identifiability as determined
 from ..plain import to_json
 from ..recording import Recording
@@ -253,6 +254,21 @@ class Fit(AbstractResult):
         solution, recording = self.solution, self.recordings[run]
         shown = np.asarray(solution.runs.outputs - solution.model.error)[run, : len(recording.times)]
         return draw_run(self.vehicle, recording, shown, np.asarray(solution.sigma))
+
+    def profile(self, names: str | Sequence[str], *, points: int = 13) -> list[Profile]:
+        """The likelihood along each of the coefficients `names` at `points` values, all others fitted again.
+
+        **Raises** `InputError` for a name that is not a free coefficient.
+        """
+        return profile(self.solution, [names] if isinstance(names, str) else names, points=points)
+
+    def posterior(self, *, draws: int = 1000, warmup: int = 300, chains: int = 4, seed: int = 0) -> Any:
+        """Draws from the posterior by NumPyro's no-U-turn sampler, as ArviZ has them (`estimate.posterior`).
+
+        `draws` of each of the `chains` are kept after `warmup` others; `seed` is of all random numbers. **Raises**
+        `InputError` without the packages of `jaxsub[bayes]`, and for a fit that leaves a direction open.
+        """
+        return posterior(self.solution, draws=draws, warmup=warmup, chains=chains, seed=seed)
 
     def to_dataframe(self) -> "pandas.DataFrame":
         """A row for each coefficient: value, standard errors, unit, verdict; complete."""

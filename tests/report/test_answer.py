@@ -140,6 +140,6 @@ def test_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(block, {})
     said = capsys.readouterr().out
-    assert "The fit explains these runs" in said and "identified" in said and made.summary in said
+    assert "The fit " in said and "B_x_drive" in said and made.summary in said
     assert (tmp_path / "result" / "improved.toml").exists()
     assert len(block.splitlines()) <= 15
