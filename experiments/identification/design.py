@@ -17,7 +17,7 @@ import numpy as np
 from jaxsub.control import scenario_two
 from jaxsub.control.limits import AMPLITUDE, RATE
 from jaxsub.information.design_information import Information, information
-from jaxsub.information.design_limits import Limits, manoeuvre, template
+from jaxsub.information.design_limits import ManoeuvreLimits, manoeuvre, template
 from jaxsub.information.manoeuvre_design import design, keeping
 from jaxsub.recording import Recording
 from jaxsub.simulation import Sampled, at_rest, doublet, prbs, three_two_one_one
@@ -27,7 +27,7 @@ from .design_figure import draw
 from .setup import DT, truth
 
 _AMPLITUDE = {"delta_r": AMPLITUDE, "delta_er": 0.2, "delta_el": 0.2}
-_LIMITS = Limits(_AMPLITUDE, dict.fromkeys(_AMPLITUDE, RATE), {"phi": 0.5, "theta": 0.5, "z": 10.0})
+_LIMITS = ManoeuvreLimits(_AMPLITUDE, dict.fromkeys(_AMPLITUDE, RATE), {"phi": 0.5, "theta": 0.5, "z": 10.0})
 _PAPER_HOLD, _HOLDS = 2.0, (0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0)
 _UNITS = (0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
 _WRONG = 0.2
@@ -87,7 +87,7 @@ def _row(told: Information, paper: Information) -> dict:
 
 
 def _designed_wrong(
-    vehicle: AbstractVehicle, times: np.ndarray, limits: Limits, starts: list[Recording], steps: int, seed: int
+    vehicle: AbstractVehicle, times: np.ndarray, limits: ManoeuvreLimits, starts: list[Recording], steps: int, seed: int
 ) -> Information:
     """What a manoeuvre tells that was designed for a vehicle each of whose free coefficients is 20 % wrong."""
     signs = np.random.default_rng(seed).choice((-1.0, 1.0), len(vehicle.layout.free))
@@ -99,7 +99,7 @@ def _designed_wrong(
     return _evaluate(vehicle, made.recording, limits)[1]
 
 
-def _evaluate(vehicle: AbstractVehicle, commands: Recording, limits: Limits) -> Found:
+def _evaluate(vehicle: AbstractVehicle, commands: Recording, limits: ManoeuvreLimits) -> Found:
     kept = keeping(vehicle, commands, limits)
     return kept, information(vehicle, kept)
 

@@ -17,7 +17,7 @@ from experiments.parts import main
 from jaxsub.discrepancy import diagnose
 from jaxsub.discrepancy.manoeuvre import Manoeuvre, recorded_limits, separating_manoeuvre
 from jaxsub.estimate import batch, search
-from jaxsub.information.design_limits import Bounds, Limits
+from jaxsub.information.design_limits import Bounds, ManoeuvreLimits
 from jaxsub.information.design_search import telegraphs
 from jaxsub.recording import Recording
 from jaxsub.vehicle import AbstractVehicle
@@ -78,7 +78,7 @@ def _row(made: Case, models: list[AbstractVehicle], recording: Recording, seeds:
     }
 
 
-def _telegraph(made: Case, limits: Limits) -> Recording:
+def _telegraph(made: Case, limits: ManoeuvreLimits) -> Recording:
     """A random telegraph signal that keeps the limits of the actuators; those of channels it need not keep."""
     held = made.vehicle.layout.held
     bounds = Bounds.of(made.vehicle, limits, made.record.times, made.record.inputs(held)[0])

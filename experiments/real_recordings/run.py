@@ -7,7 +7,7 @@ from pathlib import Path
 
 from jaxsub.cli.diagnose import answered, emit
 from jaxsub.discrepancy import Conclusions
-from jaxsub.discrepancy.diagnosis import Estimate
+from jaxsub.discrepancy.diagnosis import ParameterEstimate
 from jaxsub.vehicle import read_vehicle
 
 from .by_hand import by_hand
@@ -70,7 +70,7 @@ def numbers(diagnosis: Conclusions, case: Case) -> dict:
     }
 
 
-def in_field_units(symbol: str, estimate: Estimate, units: Mapping[str, FieldUnit]) -> dict:
+def in_field_units(symbol: str, estimate: ParameterEstimate, units: Mapping[str, FieldUnit]) -> dict:
     """An estimate as its field writes it."""
     factor, unit = units.get(symbol, (1.0, estimate.unit))
     return {"value": factor * estimate.value, "standard_error": abs(factor) * estimate.standard_error, "unit": unit}

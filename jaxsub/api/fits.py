@@ -25,7 +25,15 @@ from ..estimate import (
 )
 from ..estimate import fit as solve
 from ..findings import Finding
-from ..information import Coloured, Estimate, Identifiability, Profile, coloured_covariance, estimates, profile
+from ..information import (
+    CoefficientEstimate,
+    Coloured,
+    Identifiability,
+    Profile,
+    coloured_covariance,
+    estimates,
+    profile,
+)
 from ..information import identifiability as determined
 from ..plain import to_json
 from ..recording import Recording
@@ -178,7 +186,7 @@ class Fit(AbstractResult):
         return self if self.complete else self.allowing_colour().identified()
 
     @property
-    def estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[CoefficientEstimate]:
         """The coefficients with units, standard errors and verdicts, by what was asked so far."""
         return estimates(self.solution, self.identifiability, self.coloured)
 
@@ -315,5 +323,5 @@ class Fit(AbstractResult):
         (folder / "identification.json").write_text(to_json(self.to_json()), encoding="utf-8")
 
 
-def _without_name(estimate: Estimate) -> dict[str, Any]:
+def _without_name(estimate: CoefficientEstimate) -> dict[str, Any]:
     return {key: value for key, value in dataclasses.asdict(estimate).items() if key != "name"}

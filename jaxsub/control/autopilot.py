@@ -18,7 +18,7 @@ PITCH_LIMIT = math.radians(30.0)
 REFERENCES = ("course_rate", "depth", "roll")
 
 
-class Memory(eqx.Module):
+class AutopilotMemory(eqx.Module):
     """What an autopilot remembers: the deflections (rad) it ended with, the integral of each loop, the depth (m) it was
     shown, and whether it has yet been shown anything."""
 
@@ -70,19 +70,21 @@ class Autopilot(eqx.Module):
         pitch = (("z", "depth"), ("theta",), ("q",)) if self.depth else ()
         return yaw + pitch + ((("phi",), ("p",)) if self.roll else ())
 
-    def init(self) -> Memory:
+    def init(self) -> AutopilotMemory:
         """The memory at the start: fins and integrals at zero."""
         zeros = lambda names: {name: number(0.0) for name in names}
-        return Memory(zeros(self.limits), zeros(("yaw", "depth", "pitch", "roll")), number(0.0), jnp.asarray(True))
+        return AutopilotMemory(
+            zeros(self.limits), zeros(("yaw", "depth", "pitch", "roll")), number(0.0), jnp.asarray(True)
+        )
 
     def command(
         self,
-        memory: Memory,
+        memory: AutopilotMemory,
         shown: Mapping[str, Array],
         reference: Mapping[str, Array],
         dt: Float[Array, ""] | float,
         override: Mapping[str, Array] | None = None,
-    ) -> tuple[Memory, dict[str, Array]]:
+    ) -> tuple[AutopilotMemory, dict[str, Array]]:
         """The memory and the deflections (rad) by fin, `dt` s after the last.
 
         `shown` are measured channels, of which it needs `channels`; `reference` holds `course_rate` (rad/s), `depth`
@@ -108,7 +110,7 @@ class Autopilot(eqx.Module):
         held = memory.held | {
             name: loop.integrate(memory.held[name], errors[name], cut[name], dt) for name, loop in self._loops().items()
         }
-        return Memory(done, held, depth, jnp.asarray(False)), done
+        return AutopilotMemory(done, held, depth, jnp.asarray(False)), done
 
     def _loops(self) -> dict[str, Loop]:
         loops = {"yaw": self.course.loop} if self.course else {}

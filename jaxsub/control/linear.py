@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..methods import jittable
 from ..programs import compiled
 from ..vehicle.base import stack
-from .plant import Jacobians, Plant, Time
+from .plant import Plant, PlantJacobians, Time
 
 
 class LinearPlant(eqx.Module):
@@ -80,7 +80,7 @@ def _rates_about(plant: Plant, x: Array, u: Array, time: Time) -> LinearPlant:
     return _named(plant, shown._replace(A=by_state, B=by_input), x, u, plant.output(x, u, time), rates(x, u), 0.0)
 
 
-def _named(plant: Plant, of: Jacobians, x: Array, u: Array, y: Array, drift: Array, dt: float) -> LinearPlant:
+def _named(plant: Plant, of: PlantJacobians, x: Array, u: Array, y: Array, drift: Array, dt: float) -> LinearPlant:
     names = (plant.states, plant.inputs, plant.outputs)
     return LinearPlant(of.A, of.B, of.C, of.D, x, u, y, drift, dt, *names)
 

@@ -22,7 +22,7 @@ from .sequential import Sequential
 _SCALE = {"z": 0.5, "psi": 0.09}
 
 
-class Plan(eqx.Module):
+class MpcPlan(eqx.Module):
     """What the controller remembers from sample to sample.
 
     **Fields**
@@ -122,19 +122,27 @@ class Mpc(eqx.Module):
         """Samples of the horizon."""
         return self.nodes[-1] + 1
 
-    def start(self, inputs: Float[Array, " m"]) -> Plan:
+    def start(self, inputs: Float[Array, " m"]) -> MpcPlan:
         """Before the first sample, the inputs being `inputs`."""
-        return Plan(jnp.tile(inputs / self.weights.amplitude, len(self.nodes)), inputs)
+        return MpcPlan(jnp.tile(inputs / self.weights.amplitude, len(self.nodes)), inputs)
 
     def task(
-        self, plan: Plan, x: Float[Array, " s"], reference: Float[Array, "n t"], time: Float[Array, ""] | float = 0.0
+        self,
+        plan: MpcPlan,
+        x: Float[Array, " s"],
+        reference: Float[Array, "n t"],
+        time: Float[Array, ""] | float = 0.0,
     ) -> Task:
         """The problem of one sample."""
         return Task(self.plant, self.weights, self.nodes, x, plan.last, reference, jnp.asarray(time, x.dtype))
 
     def command(
-        self, plan: Plan, x: Float[Array, " s"], reference: Float[Array, "n t"], time: Float[Array, ""] | float = 0.0
-    ) -> tuple[Plan, Float[Array, " m"], Solved]:
+        self,
+        plan: MpcPlan,
+        x: Float[Array, " s"],
+        reference: Float[Array, "n t"],
+        time: Float[Array, ""] | float = 0.0,
+    ) -> tuple[MpcPlan, Float[Array, " m"], Solved]:
         """The plan one sample on, the inputs to give now (SI), and how they were found.
 
         `x` is the state, or what an observer says of it; `reference` what is wanted of the tracked channels at the
@@ -147,7 +155,7 @@ class Mpc(eqx.Module):
         # the search keeps the limits to its own rounding
         u = jnp.where(solved.finite, limits.apply(planned[0], plan.last, self.plant.dt), plan.last)
         later = jnp.minimum(jnp.array(self.nodes) + 1, self.samples - 1)
-        on = Plan((planned[later] / weights.amplitude).ravel(), u)
+        on = MpcPlan((planned[later] / weights.amplitude).ravel(), u)
         return jax.tree.map(lambda a, b: jnp.where(solved.finite, a, b), on, self.start(u)), u, solved
 
     def solve(self, task: Task, y: Float[Array, " d"]) -> tuple[Float[Array, " d"], Solved]:

@@ -23,7 +23,7 @@ from ..vehicle.base import stack
 Time = Float[Array, ""] | float
 
 
-class Jacobians(NamedTuple):
+class PlantJacobians(NamedTuple):
     """A (s, s) and B (s, m) of the step, C (c, s) and D (c, m) of the outputs."""
 
     A: Float[Array, "s s"]
@@ -114,11 +114,11 @@ class Plant(eqx.Module):
         return self.vehicle.channels(self.vehicle.motion(x[: self.own], signals))
 
     @jittable
-    def jacobians(self, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> Jacobians:
+    def jacobians(self, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> PlantJacobians:
         """Derivatives of `step` and `output` by state and input."""
         _, A, B = linearised(lambda x, u: self.step(x, u, time), x, u)
         _, C, D = linearised(lambda x, u: self.output(x, u, time), x, u)
-        return Jacobians(A, B, C, D)
+        return PlantJacobians(A, B, C, D)
 
     def acting(self, u: Float[Array, " m"], time: Time = 0.0) -> Float[Array, " columns1"]:
         """All signals and the time as they act on the vehicle where the inputs have long been `u`."""

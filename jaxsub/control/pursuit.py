@@ -15,7 +15,7 @@ from ..programs import compiled
 from ..recording import Recording
 from ..simulation import at_rest
 from ..vehicle import recorded_columns
-from .mpc import Mpc, Plan, Solved
+from .mpc import Mpc, MpcPlan, Solved
 from .observers import Drive, observer
 from .plant import Plant
 
@@ -107,13 +107,13 @@ def _estimated(follower: AbstractFilter, state: FilterState, sample: Sample) -> 
 
 
 @compiled
-def _planned(mpc: Mpc, plan: Plan, x: Array, reference: Array, now: Array) -> tuple[Plan, Array, Solved]:
+def _planned(mpc: Mpc, plan: MpcPlan, x: Array, reference: Array, now: Array) -> tuple[MpcPlan, Array, Solved]:
     return mpc.command(plan, x, reference, now)
 
 
 def _decided(
-    mpc: Mpc, follower: AbstractFilter, state: FilterState, plan: Plan, sample: Sample, reference: Array
-) -> tuple[FilterState, Plan, Array, Solved]:
+    mpc: Mpc, follower: AbstractFilter, state: FilterState, plan: MpcPlan, sample: Sample, reference: Array
+) -> tuple[FilterState, MpcPlan, Array, Solved]:
     """What one sample takes: the estimate, and the plan from it."""
     after = _estimated(follower, state, sample)
     return after, *_planned(mpc, plan, after.x, reference, sample.inputs.time)

@@ -44,7 +44,7 @@ class Location:
 
 
 @dataclasses.dataclass(frozen=True)
-class Estimate:
+class ParameterEstimate:
     """One number with its standard error and unit, all in SI."""
 
     value: float
@@ -73,7 +73,7 @@ class Physics:
     equations: list[str]
     expression: str
     probability: float
-    parameters: dict[str, Estimate]
+    parameters: dict[str, ParameterEstimate]
     rivals: list[Rival]
     trades: dict[str, float] = dataclasses.field(default_factory=dict)
 
@@ -189,8 +189,8 @@ class Coefficient:
     name: str
     unit: str
     start: float
-    baseline: Estimate | None
-    improved: Estimate | None
+    baseline: ParameterEstimate | None
+    improved: ParameterEstimate | None
     verdict: str
 
 

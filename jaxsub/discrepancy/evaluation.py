@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..estimate import channel_rms, initial_guess, search, side_by_side
-from ..likelihood import follow, residual_outputs
+from ..likelihood import filter_runs, residual_outputs
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulation import simulate
@@ -76,7 +76,7 @@ def _simulated(model: Model, runs: Runs, pieces: int) -> Float[Array, "r k c"]:
     vehicle, sigma = model.fit.vehicle, model.fit.sigma
     if pieces == 1:
         return simulate(vehicle, runs, search(vehicle, runs, sigma=sigma, moving=False).start)
-    followed = follow(vehicle, runs, sigma, model.view.disturbance, *initial_guess(vehicle, runs))
+    followed = filter_runs(vehicle, runs, sigma, model.view.disturbance, *initial_guess(vehicle, runs))
     return restarted(vehicle, followed, runs, pieces)
 
 

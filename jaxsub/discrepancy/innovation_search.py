@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 from ..arrays import quietly
 from ..estimate import Problem, by_cost, estimate_disturbance
-from ..likelihood import Columns, Disturbance, Followed, follow
+from ..likelihood import Columns, Disturbance, FilteredRuns, filter_runs
 from ..vehicle import AbstractVehicle
 from .settings import PRIOR_WIDTH
 
@@ -51,7 +51,7 @@ class Iterate:
 
     vehicle: AbstractVehicle
     disturbance: Disturbance
-    followed: Followed
+    followed: FilteredRuns
     base: Columns
     prior: Float[np.ndarray, "p1 p1"]
     length: Float[np.ndarray, " p"]
@@ -88,7 +88,7 @@ class InnovationSearch:
         """The innovations of a vehicle under a disturbance, and their sensitivities."""
         problem, names = self.problem, [row.name for row in vehicle.layout.free]
         disturbance = jax.tree.map(np.asarray, disturbance)
-        followed = follow(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.spread)
+        followed = filter_runs(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.spread)
         found = np.asarray(followed.products)[: 1 + len(names), : 1 + len(names)]
         length = root_or_one(np.diag(found)[1:])
         unit = np.concatenate([np.ones(1), length])

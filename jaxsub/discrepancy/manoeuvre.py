@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from ..effects import CHANNEL_UNITS
 from ..errors import InputError
 from ..estimate import Problem, batch
-from ..information.design_limits import Bounds, Limits, Range
+from ..information.design_limits import Bounds, ManoeuvreLimits, Range
 from ..information.design_search import descend, telegraphs
 from ..programs import compiled
 from ..recording import Recording
@@ -61,7 +61,7 @@ def separating_manoeuvre(
     models: Sequence[AbstractVehicle],
     like: Recording,
     sigma: Float[Array, " c"] | np.ndarray,
-    limits: Limits | None = None,
+    limits: ManoeuvreLimits | None = None,
     duration: float | None = None,
     interval: float | None = None,
     *,
@@ -116,7 +116,7 @@ def separating_manoeuvre(
     )
 
 
-def recorded_limits(vehicle: AbstractVehicle, like: Recording) -> Limits:
+def recorded_limits(vehicle: AbstractVehicle, like: Recording) -> ManoeuvreLimits:
     """What `like` asked of actuators and vehicle: an actuator between zero and its extremes, no faster than it moved.
 
     One that never moved has no limit of rate. Attitude and depth of a body, and coordinates of a mechanism, may leave
@@ -140,7 +140,7 @@ def recorded_limits(vehicle: AbstractVehicle, like: Recording) -> Limits:
         low, high = float(seen.min()), float(seen.max())
         wider = max(_WIDER * (high - low), _LEAST[CHANNEL_UNITS[name]] if body else 1e-6)
         channels[name] = (low - wider, high + wider)
-    return Limits(amplitude, rate, channels)
+    return ManoeuvreLimits(amplitude, rate, channels)
 
 
 @compiled

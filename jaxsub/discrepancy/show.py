@@ -6,7 +6,7 @@ import numpy as np
 
 from ..estimate import Solution
 from ..recording import Recording
-from .diagnosis import ChannelQuality, Coefficient, Estimate, RunQuality
+from .diagnosis import ChannelQuality, Coefficient, ParameterEstimate, RunQuality
 from .settings import CORRELATED, UNEXCITED_ERROR, WEAK_ERROR
 from .whiteness import record_sigma
 
@@ -22,14 +22,14 @@ def coefficients(start: dict[str, float], baseline: Solution, improved: Solution
     return rows
 
 
-def _estimate(fit: Solution, name: str) -> Estimate | None:
+def _estimate(fit: Solution, name: str) -> ParameterEstimate | None:
     if name not in fit.names:
         return None
     unit = next(row.unit for row in fit.vehicle.layout.free if row.name == name)
-    return Estimate(fit.values[name], fit.standard_errors[name], unit)
+    return ParameterEstimate(fit.values[name], fit.standard_errors[name], unit)
 
 
-def estimates(fit: Solution, label: str, symbols: dict[str, str]) -> dict[str, Estimate]:
+def estimates(fit: Solution, label: str, symbols: dict[str, str]) -> dict[str, ParameterEstimate]:
     """The fitted numbers of one effect by symbol."""
     found = {symbol: _estimate(fit, f"{label}.{symbol}") for symbol in symbols.values()}
     return {symbol: estimate for symbol, estimate in found.items() if estimate is not None}
@@ -51,7 +51,7 @@ def trades(fit: Solution, label: str) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda item: -abs(item[1])))
 
 
-def _verdict(estimate: Estimate) -> str:
+def _verdict(estimate: ParameterEstimate) -> str:
     ratio = estimate.standard_error / max(abs(estimate.value), 1e-300)
     return "identified" if ratio < WEAK_ERROR else "weak" if ratio < UNEXCITED_ERROR else "not excited"
 

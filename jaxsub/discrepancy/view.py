@@ -14,7 +14,7 @@ from ..estimate import Problem, Solution, by_cost
 from ..likelihood import (
     Columns,
     Disturbance,
-    Followed,
+    FilteredRuns,
     Linearised,
     System,
     first_guess,
@@ -62,7 +62,7 @@ class View:
     covariance: np.ndarray
     runs: Runs
     sigma: Array
-    followed: Followed
+    followed: FilteredRuns
     disturbance: Disturbance
     path: Trajectory
     base: Columns

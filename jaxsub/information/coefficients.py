@@ -16,7 +16,7 @@ _LONGER = "forces that the model lacks hide it: record longer runs, or try jaxsu
 
 
 @dataclasses.dataclass(frozen=True)
-class Estimate:
+class CoefficientEstimate:
     """A fitted coefficient.
 
     **Fields**
@@ -37,7 +37,7 @@ class Estimate:
     remedy: str = ""
 
 
-def estimates(fit: Solution, said: Identifiability | None, coloured: Coloured | None) -> list[Estimate]:
+def estimates(fit: Solution, said: Identifiability | None, coloured: Coloured | None) -> list[CoefficientEstimate]:
     """The coefficients of a fit; what was not asked, because the command was ended, is None.
 
     Where the residuals' disturbance could not be estimated, the standard errors for white noise are multiplied by the
@@ -60,5 +60,5 @@ def estimates(fit: Solution, said: Identifiability | None, coloured: Coloured | 
         kind, remedy = (verdict.kind, verdict.remedy) if verdict else (UNKNOWN, "")
         if verdict and kind == "identified" and verdict.relative_error * allowed > FRACTION * white[name]:
             kind, remedy = WHITE_ALONE, _LONGER
-        found.append(Estimate(name, value, unit[name], *errors, kind, remedy))
+        found.append(CoefficientEstimate(name, value, unit[name], *errors, kind, remedy))
     return found

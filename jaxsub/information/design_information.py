@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..errors import InputError
-from ..likelihood import Linearised, linearise
+from ..likelihood import Linearised, linearise_runs
 from ..recording import Recording
 from ..simulation import at_rest
 from ..vehicle import AbstractVehicle
@@ -30,7 +30,7 @@ class Information:
     **Fields**
 
     - `names`: of the p free coefficients. `matrix`: (p, p) Fisher information of their relative changes.
-    - `prior`: (p,) information held beforehand. `seconds`, `energy`: of the manoeuvre, the latter as in `Limits`.
+    - `prior`: (p,) information held beforehand. `seconds`, `energy`: of the manoeuvre, as in `ManoeuvreLimits`.
     - `peaks`: the largest size of each channel that the vehicle can produce, SI.
     """
 
@@ -79,7 +79,7 @@ def information(vehicle: AbstractVehicle, recording: Recording) -> Information:
     """
     require_designable(vehicle)
     runs = template(vehicle, [recording])
-    model = linearise(vehicle, runs, at_rest(vehicle, 1))
+    model = linearise_runs(vehicle, runs, at_rest(vehicle, 1))
     S = np.asarray(sensitivities(vehicle, model))
     shown = vehicle.channels(vehicle.motion(model.states[0], runs.signals[0]))
     inputs = np.asarray(runs.signals[0, :-1, : len(vehicle.layout.held)])

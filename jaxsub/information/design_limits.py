@@ -26,7 +26,7 @@ Range = float | tuple[float, float]
 
 
 @dataclasses.dataclass(frozen=True)
-class Limits:
+class ManoeuvreLimits:
     """What a manoeuvre may ask for, SI.
 
     **Fields**
@@ -88,7 +88,7 @@ class Bounds(eqx.Module):
 
     @classmethod
     def of(
-        cls, vehicle: AbstractVehicle, limits: Limits, times: np.ndarray, begin: np.ndarray | None = None
+        cls, vehicle: AbstractVehicle, limits: ManoeuvreLimits, times: np.ndarray, begin: np.ndarray | None = None
     ) -> "Bounds":
         """The limits for `vehicle` at `times` (K,), s, its actuators at `begin` (m,), or zero, before that."""
         limits.check(vehicle)

@@ -15,13 +15,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..likelihood import linearise
+from ..likelihood import linearise_runs
 from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulation import at_rest, sampled_states
 from ..vehicle import AbstractVehicle
 from .design_information import Information, information, log_det, require_designable
-from .design_limits import Bounds, Limits, manoeuvre, template
+from .design_limits import Bounds, ManoeuvreLimits, manoeuvre, template
 from .design_search import descend, telegraphs
 
 # weight of the squared excess over a channel's limit, and the part of the limit from which it counts
@@ -50,7 +50,7 @@ class Design:
 def design(
     vehicle: AbstractVehicle,
     times: np.ndarray,
-    limits: Limits,
+    limits: ManoeuvreLimits,
     *,
     starts: Sequence[Recording] = (),
     searches: int = 3,
@@ -92,7 +92,7 @@ def design(
     return Design(recording, information(vehicle, recording), *found[2:])
 
 
-def keeping(vehicle: AbstractVehicle, recording: Recording, limits: Limits) -> Recording:
+def keeping(vehicle: AbstractVehicle, recording: Recording, limits: ManoeuvreLimits) -> Recording:
     """`recording` with its inputs as `limits` allow: taken as commands, then made smaller until every limit holds.
 
     **Raises** `InputError` as `design` does.
@@ -118,13 +118,13 @@ class _Goal(eqx.Module):
 
     def worth(self, inputs: Float[Array, "k m"]) -> float:
         """ln det of the information; minus infinity where the vehicle's answer diverges."""
-        value = float(log_det(self.vehicle, linearise(self.vehicle, self.driven(inputs), self.start)))
+        value = float(log_det(self.vehicle, linearise_runs(self.vehicle, self.driven(inputs), self.start)))
         return value if np.isfinite(value) else -np.inf
 
     def loss(self, free: Float[Array, "k m"]) -> Float[Array, ""]:
         """Minus the criterion, per coefficient, and the penalty."""
         runs = self.driven(self.bounds.inputs(free))
-        model = linearise(self.vehicle, runs, self.start)
+        model = linearise_runs(self.vehicle, runs, self.start)
         excess = jnp.abs(self.bounds.used(self.vehicle, model.states[0], runs.signals[0])) - _MARGIN
         penalty = _PENALTY * jnp.sum(jnp.maximum(excess, 0.0) ** 2)
         return penalty - log_det(self.vehicle, model) / model.theta.shape[-1]

@@ -29,7 +29,7 @@ _OF_ALL = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Verdict:
+class CoefficientVerdict:
     """What the recordings say about one coefficient.
 
     **Fields**
@@ -78,7 +78,7 @@ class Identifiability:
     parameters: int
     null_directions: list[dict[str, float]]
     uncertainty: list[float]
-    verdicts: tuple[Verdict, ...] = ()
+    verdicts: tuple[CoefficientVerdict, ...] = ()
     families: tuple[Family, ...] = ()
 
     def sentences(self) -> list[str]:
@@ -104,7 +104,9 @@ def identifiability(fit: Solution, assessment: Assessment | None = None, watch: 
     if not fit.names:
         return Identifiability(0, 0, [], [])
     if not np.all(np.isfinite(np.asarray(fit.model.products))):
-        unknown = tuple(Verdict(n, "not converged", np.inf, remedy=_OF_ALL["not converged"]) for n in fit.names)
+        unknown = tuple(
+            CoefficientVerdict(n, "not converged", np.inf, remedy=_OF_ALL["not converged"]) for n in fit.names
+        )
         return Identifiability(0, len(fit.names), [], [], unknown)
     directions = Directions.of(fit, watch)
     open_ = np.flatnonzero(directions.open)
@@ -129,11 +131,11 @@ def identifiable_subset(fit: Solution) -> tuple[str, ...]:
     return subset(Directions.of(fit), tuple(name for name in fit.names if moves(name)))
 
 
-def _verdicts(fit: Solution, directions: Directions, families: tuple[Family, ...]) -> tuple[Verdict, ...]:
+def _verdicts(fit: Solution, directions: Directions, families: tuple[Family, ...]) -> tuple[CoefficientVerdict, ...]:
     pressed = tuple(i for i, name in enumerate(fit.names) if name in fit.at_bound)
     errors, alone = directions.relative_errors(pressed), directions.alone()
     if not (errors > FRACTION).any():
-        return tuple(Verdict(n, "identified", float(e)) for n, e in zip(fit.names, errors, strict=True))
+        return tuple(CoefficientVerdict(n, "identified", float(e)) for n, e in zip(fit.names, errors, strict=True))
     rows = np.array([[f.coefficients.get(n, 0.0) for n in fit.names] for f in families]).reshape(-1, len(fit.names))
     rows = rows / directions.size
     pinned = directions.relative_errors(pressed, rows)
@@ -142,27 +144,29 @@ def _verdicts(fit: Solution, directions: Directions, families: tuple[Family, ...
     for i, name in enumerate(fit.names):
         error = float(errors[i])
         if error <= FRACTION:
-            made.append(Verdict(name, "identified", error))
+            made.append(CoefficientVerdict(name, "identified", error))
             continue
         mine = _mine(families, rows, i)
         if not alone[i] <= FRACTION:
             remedy = _more(name, alone[i], excitation) if np.isfinite(alone[i]) else _unseen(name, mine, excitation)
-            made.append(Verdict(name, "not excited", error, (), bool(mine), remedy))
+            made.append(CoefficientVerdict(name, "not excited", error, (), bool(mine), remedy))
             continue
         partners = _partners(directions, i)
         remedies = [_break(mine, partners)] if mine else []
         if pinned[i] > FRACTION:
             remedies.append(_separate(directions, i, partners, rows if mine else rows[:0], excitation))
-        made.append(Verdict(name, "only in combination", error, partners, bool(mine), "; besides, ".join(remedies)))
+        made.append(
+            CoefficientVerdict(name, "only in combination", error, partners, bool(mine), "; besides, ".join(remedies))
+        )
     return tuple(made)
 
 
-def _withheld(verdict: Verdict, fit: Solution, assessment: Assessment) -> Verdict:
+def _withheld(verdict: CoefficientVerdict, fit: Solution, assessment: Assessment) -> CoefficientVerdict:
     """The verdict, unless the coefficient presses on a bound, or the fit is none that one could count on."""
     if verdict.name in fit.at_bound:
         kind: Kind = "at its lower bound" if fit.at_bound[verdict.name] == "lower" else "at its upper bound"
         remedy = "the optimum lies beyond it: widen the bound, or fix the coefficient and give the reason"
-        return Verdict(verdict.name, kind, np.inf, remedy=remedy)
+        return CoefficientVerdict(verdict.name, kind, np.inf, remedy=remedy)
     if verdict.kind != "identified":
         return verdict
     if not fit.converged:

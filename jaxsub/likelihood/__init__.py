@@ -20,9 +20,9 @@ from .disturbance import (
     whitened,
 )
 from .innovation_products import part_length
-from .innovations import Followed, follow
+from .innovations import FilteredRuns, filter_runs
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
-from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise, propagate, value_and_columns
+from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise_runs, propagate, value_and_columns
 
 __all__ = [
     "Adjoint",
@@ -30,7 +30,7 @@ __all__ = [
     "BlockLinearised",
     "Columns",
     "Disturbance",
-    "Followed",
+    "FilteredRuns",
     "Jacobians",
     "Linearised",
     "System",
@@ -42,12 +42,12 @@ __all__ = [
     "concentrated_sigma",
     "covariance_derivatives",
     "errors",
+    "filter_runs",
     "first_guess",
-    "follow",
     "force_columns",
     "group_means",
     "jacobians",
-    "linearise",
+    "linearise_runs",
     "negative_log_likelihood",
     "nobody",
     "output_errors",

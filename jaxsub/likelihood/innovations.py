@@ -26,7 +26,7 @@ from .disturbance import Columns, Disturbance, System, augmented, padded_width, 
 from .sensitivity import Jacobians, jacobians
 
 
-class Followed(eqx.Module):
+class FilteredRuns(eqx.Module):
     """R runs as a filter of a model followed them, linearised along its path.
 
     **Fields**
@@ -50,14 +50,14 @@ class Followed(eqx.Module):
     spread: Float[Array, ""]
 
 
-def follow(
+def filter_runs(
     vehicle: AbstractVehicle,
     runs: Runs,
     sigma: Float[Array, " c"],
     disturbance: Disturbance,
     start: Float[Array, "r s"],
     spread: Float[Array, " s"],
-) -> Followed:
+) -> FilteredRuns:
     """`vehicle` filtered along `runs` from initial states of mean `start` and standard deviation `spread`.
 
     `sigma` is the noise of the channels, SI, in whose units the columns are.
@@ -66,7 +66,7 @@ def follow(
     by = jacobians(vehicle, runs, filtered, expected, push)
     system, residual, theta, whole = _columns(vehicle.turning, runs, sigma, spread, expected, filtered, push, by)
     products, logarithm = total_products(disturbance, system, whole)
-    return Followed(expected, filtered, force, system, residual, theta, products, logarithm)
+    return FilteredRuns(expected, filtered, force, system, residual, theta, products, logarithm)
 
 
 @compiled

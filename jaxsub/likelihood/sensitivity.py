@@ -161,7 +161,7 @@ class Checkpoint(eqx.Module):
         return cls(start, *jax.device_put((own, turns)))
 
 
-def linearise(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
+def linearise_runs(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
     """`vehicle` along its trajectory from the initial states `start`."""
     at = Checkpoint.at_start(vehicle, start)
     return along(vehicle.turning, runs, at, *with_jacobians(vehicle, runs, at))[0]

@@ -85,6 +85,16 @@ def test_package_hides_none_of_its_modules(path):
     assert names.isdisjoint(modules)
 
 
+def test_no_public_name_has_two_meanings():
+    """Claim: no two rooms offer different things under one name; the front door's functions call those of rooms."""
+    offered: dict[str, list[str]] = {}
+    for path in PACKAGES:
+        if path.parent.parent == HOUSE and room(path) not in ("api", "cli"):
+            for name in bound(ast.parse(path.read_text(encoding="utf-8"))):
+                offered.setdefault(name, []).append(room(path))
+    assert {name: rooms for name, rooms in offered.items() if len(rooms) > 1 and name != "__all__"} == {}
+
+
 def test_the_reader_of_names_sees_every_form():
     source = "from .fit import fit, Fit as F\nfrom . import plain\ndef f(): ...\nclass C: ...\nx = 1\nimport os\n"
     assert list(bound(ast.parse(source))) == ["fit", "F", "f", "C", "x"]

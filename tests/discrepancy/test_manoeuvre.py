@@ -13,7 +13,7 @@ from jaxsub.discrepancy.separation import Rivals, loss
 from jaxsub.effects import VOCABULARY, with_numbers
 from jaxsub.errors import InputError
 from jaxsub.estimate import batch, search
-from jaxsub.information.design_limits import Bounds, Limits
+from jaxsub.information.design_limits import Bounds, ManoeuvreLimits
 from jaxsub.information.design_search import descend
 from jaxsub.recording import Recording, load, save
 from jaxsub.simulation import prbs, sampled_states, simulate, synthetic
@@ -135,7 +135,7 @@ def test_designed_inputs_keep_what_the_recordings_used(found):
 
 
 def test_limits_whose_sides_differ_are_kept_from_where_the_actuator_began():
-    limits = Limits({"f": (-0.2, 0.5)}, {"f": 1.0})
+    limits = ManoeuvreLimits({"f": (-0.2, 0.5)}, {"f": 1.0})
     bounds = Bounds.of(RIVALS[0], limits, TIMES, np.array([0.4]))
     wanted = 3.0 * np.random.default_rng(0).standard_normal((SAMPLES, 1))
     for inputs in (np.asarray(bounds.inputs(jnp.asarray(wanted))), np.asarray(bounds.follow(jnp.asarray(wanted)))):

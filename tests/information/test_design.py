@@ -14,9 +14,9 @@ from rigs import oscillator
 
 from jaxsub.errors import InputError
 from jaxsub.information.design_information import information, log_det
-from jaxsub.information.design_limits import Bounds, Limits, manoeuvre, template
+from jaxsub.information.design_limits import Bounds, ManoeuvreLimits, manoeuvre, template
 from jaxsub.information.manoeuvre_design import design, keeping
-from jaxsub.likelihood import linearise
+from jaxsub.likelihood import linearise_runs
 from jaxsub.simulation import at_rest, doublet, prbs, sampled_states, simulate, square, synthetic, three_two_one_one
 from jaxsub.vehicle.catalogue import dsrv
 
@@ -71,14 +71,14 @@ def test_prior_counts_as_information_held_beforehand():
 def test_gradient_through_the_linearised_model_is_that_of_central_differences():
     vehicle = dsrv()
     times = 0.3 * np.arange(25)
-    limits = Limits({"delta_s": 0.2}, {"delta_s": 0.4}, energy=0.1)
+    limits = ManoeuvreLimits({"delta_s": 0.2}, {"delta_s": 0.4}, energy=0.1)
     bounds = Bounds.of(vehicle, limits, times)
     runs = template(vehicle, [driven(vehicle, np.zeros(25), times)])
 
     @jax.jit
     def criterion(free):
         moved = dataclasses.replace(runs, signals=bounds.inputs(free)[None])
-        return log_det(vehicle, linearise(vehicle, moved, at_rest(vehicle, 1)))
+        return log_det(vehicle, linearise_runs(vehicle, moved, at_rest(vehicle, 1)))
 
     rng = np.random.default_rng(0)
     free = jnp.asarray(rng.standard_normal((25, 1)))
@@ -99,7 +99,7 @@ def test_gradient_through_the_linearised_model_is_that_of_central_differences():
 def test_inputs_keep_amplitude_rate_and_energy_whatever_is_asked(seed, amplitude, rate, energy, size):
     rng = np.random.default_rng(seed)
     times = np.cumsum(rng.uniform(0.05, 0.5, 30))
-    bounds = Bounds.of(RIG, Limits({"f": amplitude}, {"f": rate}, energy=energy), times)
+    bounds = Bounds.of(RIG, ManoeuvreLimits({"f": amplitude}, {"f": rate}, energy=energy), times)
     wanted = jnp.asarray(size * rng.standard_normal((30, 1)))
     gaps = np.diff(times)
     for inputs in (np.asarray(bounds.inputs(wanted)), np.asarray(bounds.follow(wanted))):
@@ -110,7 +110,7 @@ def test_inputs_keep_amplitude_rate_and_energy_whatever_is_asked(seed, amplitude
 
 
 def test_an_actuator_without_a_rate_limit_does_as_it_is_told():
-    bounds = Bounds.of(oscillator(), Limits({"f": 1.0}), TIMES)
+    bounds = Bounds.of(oscillator(), ManoeuvreLimits({"f": 1.0}), TIMES)
     commands = prbs(len(TIMES), 3, 2.0, 0)[:, None]
     np.testing.assert_allclose(bounds.follow(jnp.asarray(commands)), 0.5 * commands, atol=1e-9)
 
@@ -126,13 +126,13 @@ def test_design_for_a_gain_alone_is_the_dominant_singular_vector_of_its_response
     rows = np.array(impulse) / [0.02, 0.01]
     T = np.concatenate([scipy.linalg.toeplitz(column, np.zeros(n - 1)) for column in rows.T])
     best = np.linalg.norm(T, 2) ** 2 * energy / dt
-    found = design(vehicle, 0.5 * TIMES, Limits({"f": 2.0}, energy=energy), searches=2, steps=60)
+    found = design(vehicle, 0.5 * TIMES, ManoeuvreLimits({"f": 2.0}, energy=energy), searches=2, steps=60)
     assert 0.9995 * best < found.information.matrix[0, 0] < 1.0001 * best
 
 
 def test_design_beats_every_standard_manoeuvre_of_its_energy_and_shakes_a_resonance_where_it_resonates():
     vehicle = oscillator(coefficients=RESONANCE)
-    limits = Limits({"f": 0.5}, {"f": 2.0}, energy=1.0)
+    limits = ManoeuvreLimits({"f": 0.5}, {"f": 2.0}, energy=1.0)
     signals = [prbs(len(TIMES), hold, 0.5, seed) for hold in (1, 3, 7, 15, 30) for seed in range(4)]
     signals += [square(TIMES, period, 0.5) for period in (1.0, 2.0, 3.0, np.pi, 4.0, 8.0)]
     signals += [shape(TIMES, 0.0, width, 0.5) for shape in (doublet, three_two_one_one) for width in (0.8, 1.6, 2.0)]
@@ -151,7 +151,7 @@ def test_design_beats_every_standard_manoeuvre_of_its_energy_and_shakes_a_resona
 @pytest.mark.long
 def test_design_and_its_rivals_keep_the_limits_of_channels():
     vehicle = dsrv()
-    limits = Limits({"delta_s": 0.2}, {"delta_s": 0.3}, {"theta": 0.15, "z": 1.0}, energy=0.2)
+    limits = ManoeuvreLimits({"delta_s": 0.2}, {"delta_s": 0.3}, {"theta": 0.15, "z": 1.0}, energy=0.2)
     wild = driven(vehicle, np.full(len(TIMES), 0.2))
     for recording in (design(vehicle, TIMES, limits, searches=1, steps=25).recording, keeping(vehicle, wild, limits)):
         (answer,) = synthetic(vehicle, [recording], seed=0, noise=False, states=sampled_states)
@@ -164,12 +164,12 @@ def test_design_and_its_rivals_keep_the_limits_of_channels():
 @pytest.mark.parametrize(
     ("limits", "named"),
     [
-        (Limits({}), "no amplitude for the actuator 'f'"),
-        (Limits({"f": 1.0, "g": 1.0}), "no amplitude 'g'"),
-        (Limits({"f": 1.0}, {"ff": 1.0}), "did you mean 'f'"),
-        (Limits({"f": 1.0}, channels={"x_rat": 1.0}), "did you mean 'x_rate'"),
-        (Limits({"f": 0.0}), "'f' is limited to 0.0"),
-        (Limits({"f": 1.0}, energy=float("nan")), "'energy' is limited to nan"),
+        (ManoeuvreLimits({}), "no amplitude for the actuator 'f'"),
+        (ManoeuvreLimits({"f": 1.0, "g": 1.0}), "no amplitude 'g'"),
+        (ManoeuvreLimits({"f": 1.0}, {"ff": 1.0}), "did you mean 'f'"),
+        (ManoeuvreLimits({"f": 1.0}, channels={"x_rat": 1.0}), "did you mean 'x_rate'"),
+        (ManoeuvreLimits({"f": 0.0}), "'f' is limited to 0.0"),
+        (ManoeuvreLimits({"f": 1.0}, energy=float("nan")), "'energy' is limited to nan"),
     ],
 )
 def test_limits_that_do_not_fit_the_vehicle_are_refused(limits, named):
@@ -181,4 +181,4 @@ def test_vehicles_that_no_manoeuvre_can_be_designed_for_are_refused():
     silent = oscillator(outputs={"x": {"sigma": "estimate"}})
     for vehicle, named in ((silent, "noise of 'x'"), (only_free(oscillator()), "no free coefficient")):
         with pytest.raises(InputError, match=named):
-            design(vehicle, TIMES, Limits({"f": 1.0}))
+            design(vehicle, TIMES, ManoeuvreLimits({"f": 1.0}))

@@ -8,7 +8,7 @@ from rigs import driven, oscillator, stacked
 
 from jaxsub.errors import InputError
 from jaxsub.information import equivalent_systems
-from jaxsub.likelihood import linearise
+from jaxsub.likelihood import linearise_runs
 from jaxsub.simulation import simulate
 from jaxsub.simulation.synthesis import at_rest
 
@@ -74,7 +74,7 @@ CASES = {
 def test_families_are_as_many_as_the_directions_that_recordings_leave_open(vehicle):
     names = [row.name for row in vehicle.layout.free]
     runs = stacked(vehicle, [driven(vehicle, 0.25 * np.arange(200), seed=s, amplitude=0.2, hold=4) for s in (1, 2)])
-    model = linearise(vehicle, runs, at_rest(vehicle, 2) + 0.02)
+    model = linearise_runs(vehicle, runs, at_rest(vehicle, 2) + 0.02)
     sigma = np.array([output.sigma for output in vehicle.layout.outputs])
     weighted = lambda columns: (np.asarray(columns) / sigma[:, None]).reshape(2, -1, columns.shape[-1])
     theta, start = weighted(model.theta), weighted(model.start)

@@ -10,7 +10,7 @@ from rigs import body, oscillator, recorded
 
 from jaxsub.estimate import fit
 from jaxsub.information import coloured_covariance, identifiability
-from jaxsub.likelihood import BlockLinearised, blocks, linearise, output_errors
+from jaxsub.likelihood import BlockLinearised, blocks, linearise_runs, output_errors
 from jaxsub.likelihood.output_error import residual_outputs
 from jaxsub.simulation import simulate
 
@@ -37,7 +37,7 @@ def test_linearised_model_does_not_depend_on_the_blocks(cut, samples):
     vehicle = oscillator()
     runs = recorded(vehicle, 2, 151, 0.1, seed=5)
     start, sigma = jnp.zeros((2, 2)), jnp.array([0.01, 0.02])
-    whole = linearise(vehicle, runs, start)
+    whole = linearise_runs(vehicle, runs, start)
     cut(samples)
     shares = []
     found = BlockLinearised.of(vehicle, runs, start, sigma, jnp.ones(2), shares.append)
@@ -53,7 +53,7 @@ def test_window_is_that_part_of_the_whole(cut):
     vehicle = oscillator()
     runs = recorded(vehicle, 3, 101, 0.1, seed=5)
     start = jnp.zeros((3, 2))
-    whole = linearise(vehicle, runs, start)
+    whole = linearise_runs(vehicle, runs, start)
     cut(60)
     found = BlockLinearised.of(vehicle, runs, start, jnp.ones(2), jnp.ones(2))
     window, model = found.window(1, np.array([0, 2]), 50)

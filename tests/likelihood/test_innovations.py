@@ -14,7 +14,7 @@ from rigs import oscillator, recorded
 
 from jaxsub.effects.hull_damping import QuadraticDamping
 from jaxsub.effects.sensor_response import SensorDelay
-from jaxsub.likelihood import Columns, Disturbance, follow, smoothed, whitened
+from jaxsub.likelihood import Columns, Disturbance, filter_runs, smoothed, whitened
 from jaxsub.parameters import number
 from jaxsub.simulation import Sampled
 
@@ -31,7 +31,7 @@ def runs():
 
 
 def led(vehicle, runs):
-    return follow(vehicle, runs, SIGMA, DISTURBANCE, jnp.zeros((2, 2)), SPREAD)
+    return filter_runs(vehicle, runs, SIGMA, DISTURBANCE, jnp.zeros((2, 2)), SPREAD)
 
 
 def innovations(vehicle, runs):
@@ -92,7 +92,7 @@ def test_a_nonlinear_model_is_followed_where_a_free_run_goes_astray():
     runs = recorded(truth, 2, 200, 0.1, seed=5, amplitude=3.0)
     free = np.asarray(Sampled.of(oscillator(), runs).states(runs, jnp.zeros((2, 2))))
     wide = dataclasses.replace(DISTURBANCE, force=jnp.array([5.0]))
-    followed = follow(oscillator(), runs, SIGMA, wide, jnp.zeros((2, 2)), SPREAD)
+    followed = filter_runs(oscillator(), runs, SIGMA, wide, jnp.zeros((2, 2)), SPREAD)
     position = np.asarray(runs.outputs)[..., 0]
     away = lambda states: np.sqrt(np.mean((np.asarray(states)[..., 1] - position) ** 2))
     assert away(followed.expected) < 0.1 * away(free)

@@ -8,7 +8,7 @@ import pytest
 from rigs import driven, stacked
 
 from jaxsub.effects import ActuatorLag, HullAsymmetry, QuadraticDamping, SensorScale
-from jaxsub.likelihood import errors, force_columns, linearise
+from jaxsub.likelihood import errors, force_columns, linearise_runs
 from jaxsub.recording import Recording
 from jaxsub.simulation import simulate, synthetic
 from jaxsub.vehicle.catalogue import dsrv
@@ -37,7 +37,7 @@ def case():
     inputs = [driven(vehicle, times, seed, hold=4) for seed, times in enumerate(spans)]
     runs = stacked(vehicle, [with_gaps(recording) for recording in synthetic(vehicle, inputs, seed=7)])
     start = jnp.asarray(0.02 * rng.normal(size=(2, 4)))
-    return vehicle, runs, start, linearise(vehicle, runs, start)
+    return vehicle, runs, start, linearise_runs(vehicle, runs, start)
 
 
 def moved(vehicle, runs, start):

@@ -10,10 +10,10 @@ from jaxsub.discrepancy.diagnosis import (
     ChannelQuality,
     Coefficient,
     Conclusions,
-    Estimate,
     Explained,
     Gain,
     Location,
+    ParameterEstimate,
     Physics,
     Regime,
     Remainder,
@@ -127,7 +127,7 @@ def _physics(verdict: str) -> Physics:
     ]
     return Physics(
         "crossflow-drag", "crossflow-drag[horizontal]", ["sway", "yaw"], "-½ρD C_d ∫ (1, x) |v + x r|(v + x r) dx",
-        0.978 if sure else 0.53, {"C_d": Estimate(0.61372, 0.0214, "1")}, rivals,
+        0.978 if sure else 0.53, {"C_d": ParameterEstimate(0.61372, 0.0214, "1")}, rivals,
         {"Y_v": -0.973},
     )  # fmt: skip
 
@@ -183,7 +183,7 @@ def _coefficients(make: np.random.Generator, found: bool) -> list[Coefficient]:
     rows = []
     for name, unit, start, value, error in COEFFICIENTS:
         after = value + (make.normal() * error if abs(value / start - 1) < 0.1 else 0.95 * (start - value))
-        improved = Estimate(after if np.isfinite(after) else value, error * 1.2, unit) if found else None
+        improved = ParameterEstimate(after if np.isfinite(after) else value, error * 1.2, unit) if found else None
         verdict = "not excited" if np.isinf(error) else "weak" if error > abs(value) / 2 else "identified"
-        rows.append(Coefficient(name, unit, start, Estimate(value, error, unit), improved, verdict))
+        rows.append(Coefficient(name, unit, start, ParameterEstimate(value, error, unit), improved, verdict))
     return rows

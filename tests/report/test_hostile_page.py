@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from report_examples import VEHICLE, diagnosis
 
-from jaxsub.discrepancy.diagnosis import Estimate, Explained
+from jaxsub.discrepancy.diagnosis import Explained, ParameterEstimate
 from jaxsub.findings import Finding
 from jaxsub.plain import to_json
 from jaxsub.report import write_report
@@ -42,7 +42,7 @@ def hostile(text):
     renamed = lambda table: {f"{text}{key}": value for key, value in table.items()}
     physics = dataclasses.replace(
         made.physics[0], label=text, effect=text, expression=text, equations=[text, f"sensor:{text}"],
-        parameters={text: Estimate(1.0, 0.1, text)}, trades={text: 0.95},
+        parameters={text: ParameterEstimate(1.0, 0.1, text)}, trades={text: 0.95},
         rivals=[dataclasses.replace(made.physics[0].rivals[0], label=text, effect=text)],
     )  # fmt: skip
     places = [
