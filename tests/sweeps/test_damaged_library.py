@@ -23,12 +23,10 @@ def swept(folder, name):
     return open_sweep(folder / name), library
 
 
-def test_truncated_and_garbled_libraries_are_made_anew(tmp_path):
+def test_a_garbled_library_is_made_anew(tmp_path):
     found, library = swept(tmp_path, "sound")
     sound = library.read_bytes()
-    garbled = bytes(byte ^ 0xA5 if i > 64 and i % 97 == 0 else byte for i, byte in enumerate(sound))
-    for name, damaged in (("truncated", sound[:2000]), ("garbled", garbled)):
-        library.write_bytes(damaged)
-        again, library = swept(tmp_path, name)
-        assert library.read_bytes() == sound
-        assert farthest(found, again) == 0.0
+    library.write_bytes(bytes(byte ^ 0xA5 if i > 64 and i % 97 == 0 else byte for i, byte in enumerate(sound)))
+    again, library = swept(tmp_path, "garbled")
+    assert library.read_bytes() == sound
+    assert farthest(found, again) == 0.0
