@@ -60,8 +60,11 @@ def room_for_programs() -> Iterator[None]:
     To count them takes up to 30 ms, and most of the thousands of tests make none.
     """
     from jaxsub.discrepancy.programs import make_room
+    from jaxsub.programs import keep_programs
 
     yield
+    # a command run in this process keeps them, but in later tests something of what they are made of may be replaced
+    keep_programs(None)
     if _compiled:
         _compiled.clear()
         make_room()

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import get_completion_class
 
 from . import process
 from .options import common
@@ -15,6 +16,7 @@ _PATH = process.Location()
 METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
 STARTS = ("rest", "recorded", "estimated")
 KINDS = ("auv", "glider", "rov", "ship", "usv")
+SHELLS = ("bash", "zsh", "fish")
 PUBLISHED = ("bluerov2-heavy", "kvlcc2", "otter", "remus-100")
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
@@ -26,10 +28,24 @@ def _out(**settings: object) -> Callable:
     return click.option("--out", type=_PATH, help="Where the results go.", **settings)  # pyright: ignore[reportArgumentType]
 
 
+def _print_versions(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+    """Print the versions of what computes, and the device that commands compute on."""
+    if not wanted or context.resilient_parsing:
+        return
+    from . import run_log, session
+
+    session.choose_device()
+    for name, version in (*run_log.versions().items(), ("device", run_log.device())):
+        click.echo(f"{name} {version}")
+    context.exit()
+
+
 @click.group(
     cls=process.Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]}
 )
-@click.version_option(package_name="jaxsub")
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_versions, help="Show versions."
+)
 @common
 @click.pass_context
 def app(context: click.Context) -> None:
@@ -241,6 +257,16 @@ def sweep(out: Path, overwrite: bool, **arguments: Any) -> None:
     from . import sweep as command
 
     command.run(command.Asked(**arguments), out, overwrite)
+
+
+@app.command()
+@click.argument("shell", type=click.Choice(SHELLS))
+@common
+def completion(shell: str) -> None:
+    """Print a script by which SHELL completes commands, options and paths."""
+    kind = get_completion_class(shell)
+    assert kind is not None  # click knows each of SHELLS
+    click.echo(kind(app, {}, "jaxsub", "_JAXSUB_COMPLETE").source())
 
 
 def main() -> None:

@@ -13,6 +13,7 @@ from ..errors import InputError, OutputError
 from ..storage import Manifest, place, scratch
 from ..storage.whole import flush
 from .options import options
+from .run_log import RunLog
 
 # a folder for the next of a command's results
 Fresh = Callable[[], AbstractContextManager[Path]]
@@ -89,7 +90,8 @@ def _require_ours(out: Path) -> None:
 def fresh_folder(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Iterator[Path]:
     """A folder to write results to, which takes the place of `out` when the block ends well and vanishes otherwise.
 
-    It gets the manifest of what was written. `inputs` are the files that the command reads.
+    It gets `run.json`, which says what it was made by, and the manifest of what was written. `inputs` are the files
+    that the command reads.
 
     **Raises** `InputError` where `out` may not be replaced (`require_replaceable`), where another process writes there
     and where nothing can be written there; `OutputError` where writing fails later.
@@ -105,6 +107,7 @@ def fresh_folders(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> It
     Each takes the place of the one before, so that what ends the command later leaves the last one at `out`.
     """
     require_replaceable(out, overwrite, inputs)
+    log = RunLog(inputs)
     with claimed(out) as folder:
         number = itertools.count()
 
@@ -115,6 +118,7 @@ def fresh_folders(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> It
             new.mkdir(parents=True)
             with _told_of(new, out):
                 yield new
+                log.write(new)
                 manifest = Manifest.of_folder(new)
                 manifest.begin(_command())
                 manifest.add_all()

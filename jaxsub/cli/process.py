@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from ..errors import InputError, OutputError, nearest
 from .interruption import INTERRUPTED, Watch, leave
@@ -39,6 +40,10 @@ class Location(click.ParamType):
             limit = f"{_LONGEST_NAME} bytes a name, {_LONGEST_PATH} in all"
             self.fail(f"the path is {len(raw)} bytes long, beyond what file systems allow ({limit})", param, ctx)
         return Path(value)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Whatever files the shell finds."""
+        return [CompletionItem(incomplete, type="file")]
 
 
 class Commands(click.Group):

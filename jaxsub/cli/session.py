@@ -32,10 +32,15 @@ def start(long: bool = False, recordings: Sequence[Path] = ()) -> None:
     processor beside it takes 83.
     """
     if not long:
-        jax.config.update("jax_platforms", os.environ.get("JAX_PLATFORMS") or "cpu")
+        choose_device()
         _compile_quickly(_AS_QUICKLY_AS_CAN_BE if recordings and _size(recordings) <= _SMALL else _QUICKLY)
     jax.config.update("jax_enable_x64", True)
     _keep_programs()
+
+
+def choose_device() -> None:
+    """The processor, unless `JAX_PLATFORMS` names another device."""
+    jax.config.update("jax_platforms", os.environ.get("JAX_PLATFORMS") or "cpu")
 
 
 def _keep_programs() -> None:

@@ -42,7 +42,7 @@ def test_fit_is_kept_when_what_follows_is_ended(tmp_path, number):
     _, said = process.communicate(timeout=60)
     assert process.returncode == (-9 if number == signal.SIGKILL else 130) and "Traceback" not in said
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == {"fitted.toml", "coefficients.csv", "identification.json", ".jaxsub.jsonl"}
+    assert names == {"fitted.toml", "coefficients.csv", "identification.json", "run.json", ".jaxsub.jsonl"}
     found = json.loads((tmp_path / "out" / "identification.json").read_text(encoding="utf-8"))
     assert found["complete"] is False and found["converged"] is True
     assert abs(found["coefficients"]["K_x"]["value"] - 4.0) < 5.0 * found["coefficients"]["K_x"]["standard_error"]
