@@ -15,6 +15,7 @@ _PATH = process.Location()
 # said here and not asked of `estimate`, so that `--help` needs no jax; a test holds the two together
 METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "mekf", "ekf")
 STARTS = ("rest", "recorded", "estimated")
+_SENSORS = "sensors"
 KINDS = ("auv", "glider", "rov", "ship", "usv")
 SHELLS = ("bash", "zsh", "fish")
 PUBLISHED = ("bluerov2-heavy", "kvlcc2", "otter", "remus-100")
@@ -176,7 +177,8 @@ def navigate(log: Path, sensors: Path, out: Path, overwrite: bool) -> None:
 
 
 @app.command()
-@click.argument("kind", type=click.Choice(KINDS), required=False)
+@click.argument("kind", type=click.Choice((*KINDS, _SENSORS)), required=False)
+@click.argument("sensor_log", type=_PATH, required=False)
 @dimensions
 @click.option("--like", type=click.Choice(PUBLISHED), help="A published vehicle in place of a kind.")
 @click.option("--log", type=_PATH, help="A recording whose columns are the inputs and outputs.")
@@ -186,6 +188,7 @@ def navigate(log: Path, sensors: Path, out: Path, overwrite: bool) -> None:
 @common
 def init(
     kind: str | None,
+    sensor_log: Path | None,
     like: str | None,
     log: Path | None,
     columns: Path | None,
@@ -193,7 +196,18 @@ def init(
     overwrite: bool,
     **sizes: Any,
 ) -> None:
-    """Begin a vehicle file: coefficients estimated from dimensions, with their uncertainty and source."""
+    """Begin a vehicle file: coefficients estimated from dimensions, with their uncertainty and source.
+
+    `jaxsub init sensors LOG` begins a sensor file for `jaxsub navigate`, by the names of a log's columns.
+    """
+    if kind == _SENSORS:
+        from . import init_sensors
+
+        options = {"like": like, "log": log, "columns": columns, **sizes}
+        init_sensors.run(sensor_log, [name for name, value in options.items() if value is not None], out, overwrite)
+        return
+    if sensor_log is not None:
+        raise click.UsageError(f"{sensor_log} is given beside a vehicle; give a log as --log {sensor_log}")
     from . import init as command
 
     given = {name: size for name, size in sizes.items() if size is not None}

@@ -15,6 +15,7 @@ from .effort import TimeLeft
 from .output import fresh_folder, paths_of
 
 _STEPS = "filtering and smoothing"
+_TAKEN = {True: "taken off", False: "left"}
 
 
 def run(log_path: Path, sensors_path: Path, out: Path, overwrite: bool) -> None:
@@ -54,8 +55,17 @@ def _show(content: dict[str, Any]) -> None:
         ("constant", "value", "± 1 σ", "unit"),
         [(n, f"{r['value']:.3g}", f"{r['standard_error']:.2g}", r["unit"]) for n, r in content["constants"].items()],
     )
+    if field := content["magnetometer"]:
+        terminal.say(_field_line(field))
     for sentence in content["unobserved"]:
         terminal.say(sentence)
+
+
+def _field_line(field: dict[str, Any]) -> str:
+    """Delay and hard iron of the magnetometer in a sentence."""
+    delay = f"{1e3 * field['delay']:.3g} ± {1e3 * field['delay_std']:.2g} ms ({_TAKEN[field['delayed']]})"
+    spread = f"{100.0 * field['before']:.2g} % as read and {100.0 * field['after']:.2g} % without its hard iron"
+    return f"magnetometer: delay {delay}; the field's strength differs by {spread} ({_TAKEN[field['corrected']]})"
 
 
 def _shown(unit: str, *values: float) -> tuple[str, ...]:

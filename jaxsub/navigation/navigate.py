@@ -23,6 +23,7 @@ from ..filter import (
     smooth_block,
 )
 from ..findings import Finding
+from .field import FieldFit, with_field
 from .rotation import from_euler, product
 from .rows import Rows, padded, rows_of
 from .start import Start, start_of
@@ -51,6 +52,7 @@ class Navigation:
     - `suite`, `log`, `rows`, `start`: what it was made of. `filtered`: given the rows so far; `smoothed`: given all.
     - `innovations`: (K, c) over their standard deviations; `used`: (K, c) where measured and believed.
     - `measured`: (K, c) where measured. `channels`: of each sensor, and of what is known beforehand.
+    - `findings`: what was wrong with the readings. `field`: of a magnetometer that was to be calibrated or timed.
     - `delays`: names of sensors whose delay is a state, in the order of the states.
     """
 
@@ -66,6 +68,7 @@ class Navigation:
     channels: dict[str, slice]
     delays: tuple[str, ...]
     findings: tuple[Finding, ...]
+    field: FieldFit | None
 
 
 class _Seen(NamedTuple):
@@ -80,6 +83,7 @@ def navigate(log: SensorLog, suite: SensorSuite, told: Told = lambda done, of: N
     `told` is given how many passes over the rows are done, and of how many. **Raises** `InputError` for a log without
     inertial readings, and where the filter breaks down.
     """
+    log, suite, field = with_field(log, suite)
     rows, start = rows_of(log, suite), start_of(log, suite)
     filter, late, channels = filter_of(log, suite, start)
     arm = jnp.asarray(suite.only("accelerometer").lever_arm)
@@ -107,7 +111,7 @@ def navigate(log: SensorLog, suite: SensorSuite, told: Told = lambda done, of: N
     filtered, smoothed = (_with_delays(track, nominal) for track in (found.seen.track, found.smoothed))
     return Navigation(
         suite, log, rows, start, filtered, smoothed, innovations, used,
-        np.asarray(rows.samples.mask), channels, late, (*log.findings, *rows.findings),
+        np.asarray(rows.samples.mask), channels, late, (*log.findings, *rows.findings), field,
     )  # fmt: skip
 
 

@@ -85,6 +85,7 @@ def summary(found: Navigation) -> dict[str, Any]:
             name: {"median": float(np.median(std)), "largest": float(np.max(std)), "unit": UNITS[name]}
             for name, std in zip(MOTION, np.asarray(track.motion_std).T, strict=True)
         },
+        "magnetometer": None if found.field is None else found.field._asdict(),
         "unobserved": unobserved(found),
         "findings": [finding.to_json() for finding in found.findings],
     }

@@ -26,6 +26,7 @@ GUIDES = (
     "add-a-vehicle",
     "describe-your-sensors",
     "logs-and-data",
+    "navigate",
     "commands",
     "how-diagnosis-works",
     "which-method",

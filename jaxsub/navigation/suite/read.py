@@ -17,7 +17,7 @@ from .suite import KINDS, RULES, Kind, Motion, Sensor, SensorSuite, Vector
 
 _EVERY = ("kind", "column", "channel", "unit", "frame")
 _MOST = 50
-_CALIBRATIONS = ("none", "hard-iron", "soft-iron")
+_CALIBRATIONS = ("none", "hard-iron")
 # s, standard deviation of a delay that is to be estimated
 _DELAY_STD = 0.1
 _HALF_TURN, _QUARTER = math.pi, 0.5 * math.pi
