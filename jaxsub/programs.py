@@ -43,7 +43,7 @@ def keep_programs(folder: Path | None) -> None:
 def compiled(function: F) -> F:
     """The function as `equinox.filter_jit` makes it; its programs are kept where `keep_programs` says.
 
-    Within a trace, and where no digest can be given, it is `equinox.filter_jit` itself.
+    Within a trace, on several devices, and where no digest can be given, it is `equinox.filter_jit` itself.
     """
     return cast(F, _Compiled(function))
 
@@ -59,13 +59,17 @@ class _Compiled:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         leaves, structure = jax.tree.flatten((args, kwargs))
         arrays = [leaf for leaf in leaves if eqx.is_array(leaf)]
-        if _Kept.folder is None or _traced(arrays):
+        if _Kept.folder is None or jax.local_device_count() > 1 or _traced(arrays):
             return self._jitted(*args, **kwargs)
         key = structure, tuple(map(_kind, leaves))
         if key not in self._calls:
             self._calls[key] = _kept(_Kept.folder, self._function, args, kwargs)
         call = self._calls[key]
         return self._jitted(*args, **kwargs) if call is None else call(arrays)
+
+    def lower(self, *args: Any, **kwargs: Any) -> Any:
+        """The lowered program, as by `equinox.filter_jit`; it is not kept."""
+        return self._jitted.lower(*args, **kwargs)
 
     def __get__(self, instance: Any, owner: Any) -> Any:
         return self if instance is None else types.MethodType(self, instance)

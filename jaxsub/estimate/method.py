@@ -143,8 +143,8 @@ def in_shares(program: Program[T], method: Any, problem: Problem, starts: Array,
 
 def _over_cores(program: Any, method: Any, problem: Problem, rounds: Sequence[tuple[Array, Any]]) -> list:
     """A thread for each share. Compiled before: threads that trace the same program at once can crash JAX."""
-    compiled = program.lower(method, problem, *rounds[0]).compile()
-    own = lambda part: jax.block_until_ready(compiled(method, problem, *part))
+    ready = program.lower(method, problem, *rounds[0]).compile()
+    own = lambda part: jax.block_until_ready(ready(method, problem, *part))
     with ThreadPoolExecutor(shares_at_once()) as threads:
         return list(threads.map(own, rounds))
 
