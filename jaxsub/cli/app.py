@@ -166,14 +166,15 @@ def simulate(vehicle: Path, run: Path, out: Path, start: Any, columns: Path | No
 @app.command()
 @click.argument("log", type=_PATH)
 @click.option("--sensors", type=_PATH, required=True, help="A TOML file that describes the sensors.")
+@click.option("--reference", type=_PATH, help="A recording of the true motion on the log's clock, for errors.")
 @_out(required=True)
 @_overwrite
 @common
-def navigate(log: Path, sensors: Path, out: Path, overwrite: bool) -> None:
+def navigate(log: Path, sensors: Path, reference: Path | None, out: Path, overwrite: bool) -> None:
     """Attitude, velocity and position with standard deviations, from the raw sensors of a log."""
     from . import navigate as command
 
-    command.run(log, sensors, out, overwrite)
+    command.run(log, sensors, out, overwrite, reference)
 
 
 @app.command()

@@ -5,11 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from ..navigation.navigate import Navigation, navigate
-from ..navigation.recorded import recording_of, summary
+from ..navigation.recorded import recording_of, reference_errors, summary
 from ..navigation.suite import read_sensors
 from ..navigation.suite.log import load_sensors
 from ..plain import to_json
-from ..recording import save
+from ..recording import load, save
+from ..report import write_navigation_report
 from . import session, terminal
 from .effort import TimeLeft
 from .output import fresh_folder, paths_of
@@ -18,22 +19,25 @@ _STEPS = "filtering and smoothing"
 _TAKEN = {True: "taken off", False: "left"}
 
 
-def run(log_path: Path, sensors_path: Path, out: Path, overwrite: bool) -> None:
-    """Navigate by the log; write `navigation.parquet`, `filtered.parquet` and `navigation.json` into `out`."""
+def run(log_path: Path, sensors_path: Path, out: Path, overwrite: bool, reference: Path | None = None) -> None:
+    """Write `navigation.parquet`, `filtered.parquet`, `navigation.json` and a report into `out`."""
     session.start()
-    with fresh_folder(out, overwrite, paths_of(log_path, sensors_path)) as folder:
+    with fresh_folder(out, overwrite, paths_of(log_path, sensors_path, reference)) as folder:
         suite = read_sensors(sensors_path)
         log = load_sensors(log_path, suite)
+        truth = None if reference is None else load(reference)
         terminal.warn(log.findings)
         with terminal.progress(f"navigating by {suite.name}") as told:
             told(_STEPS)
             found = navigate(log, suite, TimeLeft(told, _STEPS))
         terminal.warn(found.rows.findings)
-        content = summary(found)
+        content = summary(found) | {"errors": {} if truth is None else reference_errors(found, truth)}
         terminal.emit(content, lambda: _show(content))
         with terminal.progress("writing") as told:
             told("recordings")
             _write(found, content, folder)
+            told("the report")
+            write_navigation_report(found, content, folder)
 
 
 def _write(found: Navigation, content: dict[str, Any], folder: Path) -> None:
@@ -55,6 +59,9 @@ def _show(content: dict[str, Any]) -> None:
         ("constant", "value", "± 1 σ", "unit"),
         [(n, f"{r['value']:.3g}", f"{r['standard_error']:.2g}", r["unit"]) for n, r in content["constants"].items()],
     )
+    if content["errors"]:
+        rows = [(n, *_shown(row["unit"], row["rms"]), f"{row['ratio']:.2f}") for n, row in content["errors"].items()]
+        terminal.table(("channel", "rms error", "unit", "rms of error/σ"), rows)
     if field := content["magnetometer"]:
         terminal.say(_field_line(field))
     for sentence in content["unobserved"]:

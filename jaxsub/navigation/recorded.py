@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import InputError
 from ..recording import Recording
 from .consistency import consistency
 from .navigate import Navigation
@@ -62,6 +63,32 @@ def _white(found: Navigation, kind: str) -> float:
     noise = found.suite.only(kind).noise
     assert noise is not None
     return noise.density / math.sqrt(float(np.median(np.diff(found.log.times))))
+
+
+def reference_errors(found: Navigation, reference: Recording) -> dict[str, dict[str, float | str]]:
+    """Errors of the smoothed motion against the columns of `MOTION` that a reference on the same clock has.
+
+    `rms` in the channel's unit, and `ratio`, the rms of errors over their standard deviations: one where the bands are
+    right. Raises InputError where the two have no channel, or no time, in common.
+    """
+    motion, std = np.array(found.smoothed.motion), np.asarray(found.smoothed.motion_std)
+    motion[:, :3] = np.unwrap(motion[:, :3], axis=0)
+    times, errors = found.log.times, {}
+    for i, name in enumerate(MOTION):
+        if name not in reference.columns:
+            continue
+        known = reference.column(name)
+        inside = np.isfinite(known) & (reference.times >= times[0]) & (reference.times <= times[-1])
+        at = reference.times[inside]
+        apart = np.interp(at, times, motion[:, i]) - known[inside]
+        apart = (apart + np.pi) % (2.0 * np.pi) - np.pi if i < 3 else apart
+        if at.size:
+            ratio = float(np.sqrt(np.mean((apart / np.interp(at, times, std[:, i])) ** 2)))
+            errors[name] = {"rms": float(np.sqrt(np.mean(apart**2))), "ratio": ratio, "unit": UNITS[name]}
+    if not errors:
+        what = f"has none of {', '.join(MOTION)} in the time of the log"
+        raise InputError(reference.source, what, "name its columns so, in the log's clock")
+    return errors
 
 
 def summary(found: Navigation) -> dict[str, Any]:

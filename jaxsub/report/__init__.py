@@ -7,11 +7,20 @@ if TYPE_CHECKING:
     from .checked_runs import draw_checked_runs
     from .drawing import Picture
     from .figures import draw
+    from .navigation import write_navigation_report
     from .overlay import draw_run
     from .page import write_report
     from .sweeps import sweep_pictures
 
-__all__ = ["Picture", "draw", "draw_checked_runs", "draw_run", "sweep_pictures", "write_report"]
+__all__ = [
+    "Picture",
+    "draw",
+    "draw_checked_runs",
+    "draw_run",
+    "sweep_pictures",
+    "write_navigation_report",
+    "write_report",
+]
 
 _MODULES = {
     "Picture": "drawing",
@@ -19,6 +28,7 @@ _MODULES = {
     "draw_checked_runs": "checked_runs",
     "draw_run": "overlay",
     "sweep_pictures": "sweeps",
+    "write_navigation_report": "navigation",
     "write_report": "page",
 }
 

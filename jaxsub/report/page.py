@@ -63,7 +63,7 @@ def render(diagnosis: Conclusions, vehicle_text: str, pictures: dict[str, Pictur
         "channel_rows": tables.channel_rows(diagnosis),
         "decision_rows": decision_rows(diagnosis.decisions),
     }
-    return _environment().get_template("template.html.j2").render(context)
+    return environment().get_template("template.html.j2").render(context)
 
 
 def _added(diagnosis: Conclusions, vehicle_text: str) -> str:
@@ -76,7 +76,8 @@ def _key_numbers(diagnosis: Conclusions) -> list[tables.KeyNumber]:
     return [number for number in numbers if number is not None]
 
 
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """Templates of this room, with numbers and formulas as a person would write them."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("jaxsub.report", ""),
         autoescape=True,

@@ -73,11 +73,18 @@ def test_the_command_writes_what_the_library_finds(found, tmp_path, monkeypatch,
     log["delta_r"] = np.sin(TIMES)
     save(Recording("dive", TIMES, log, "dive"), tmp_path / "dive.csv")
     (tmp_path / "sensors.toml").write_text(TEXT)
-    arguments = (tmp_path / "dive.csv", "--sensors", tmp_path / "sensors.toml", "--out", tmp_path / "out", "--json")
+    true = dict(zip(("phi", "theta", "psi"), truth.angles.T, strict=True)) | {"x": truth.position[:, 0]}
+    save(Recording("truth", TIMES, true, "truth"), tmp_path / "truth.csv")
+    more = ("--out", tmp_path / "out", "--reference", tmp_path / "truth.csv", "--json")
+    arguments = (tmp_path / "dive.csv", "--sensors", tmp_path / "sensors.toml", *more)
     code, said = ran(monkeypatch, capsys, "navigate", *arguments)
     assert code == 0, said.err
     run, content = load(tmp_path / "out" / "navigation.parquet"), json.loads(said.out)
     assert content == json.loads((tmp_path / "out" / "navigation.json").read_text())
+    rms = np.sqrt(np.mean(errors(truth, found[0][1].smoothed) ** 2, axis=0))
+    np.testing.assert_allclose([content["errors"][n]["rms"] for n in ("phi", "theta", "psi", "x")], rms[[0, 1, 2, 6]])
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert all(f"<th>{name}</th>" in page for name in ("dvl", "usbl", "gyro_bias_x")) and 'src="http' not in page
     motion = np.asarray(found[0][1].smoothed.motion)
     for i, name in enumerate(("phi", "theta", "psi", "u", "v", "w", "x", "y", "z")):
         apart = run.column(name) - motion[:, i]

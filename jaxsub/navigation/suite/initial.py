@@ -89,7 +89,8 @@ def _fits(kind: str, unit: str) -> bool:
 def _table(kind: str, columns: tuple[str, ...], units: dict[str, str]) -> list[str]:
     """The lines of a sensor's table."""
     known = KINDS[kind]
-    first, *_ = next(channels for channels in known.channels if len(channels) == len(columns))
+    usual = {len(channels): channels for channels in reversed(known.channels)}
+    first = str(usual[len(columns)][0])
     listed = ", ".join(map(_quoted, columns)) if len(columns) > 1 else ""
     lines = ["", f"[sensors.{kind}]", f"column = [{listed}]" if listed else f"column = {_quoted(columns[0])}"]
     if not any(units[column] for column in columns):
