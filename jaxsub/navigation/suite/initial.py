@@ -89,10 +89,9 @@ def _fits(kind: str, unit: str) -> bool:
 def _table(kind: str, columns: tuple[str, ...], units: dict[str, str]) -> list[str]:
     """The lines of a sensor's table."""
     known = KINDS[kind]
-    usual = {len(channels): channels for channels in reversed(known.channels)}
-    first = str(usual[len(columns)][0])
-    listed = ", ".join(map(_quoted, columns)) if len(columns) > 1 else ""
-    lines = ["", f"[sensors.{kind}]", f"column = [{listed}]" if listed else f"column = {_quoted(columns[0])}"]
+    first = next(channels for channels in known.channels if len(channels) == len(columns))[0]
+    listed = ", ".join(map(_quoted, columns))
+    lines = ["", f"[sensors.{kind}]", f"column = {f'[{listed}]' if len(columns) > 1 else listed}"]
     if not any(units[column] for column in columns):
         lines.append(f'unit = "{known.units[first]}"'.ljust(37) + "# the log states none")
     if known.frames:
