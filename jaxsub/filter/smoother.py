@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
+from ..programs import compiled
 from .ekf import AbstractFilter, FilterState
 from .model import Sample, linearised
 from .small import backward, forward
@@ -52,7 +53,7 @@ def last(filter: AbstractFilter, state: FilterState) -> Smoothed:
     return Smoothed(state.x, filter.form.covariance(state.joint)[:s, :s])
 
 
-@eqx.filter_jit
+@compiled
 def smooth_block(
     filter: AbstractFilter,
     begin: FilterState,

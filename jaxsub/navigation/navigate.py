@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -23,6 +22,7 @@ from ..filter import (
     smooth_block,
 )
 from ..findings import Finding
+from ..programs import compiled
 from .field import FieldFit, with_field
 from .rotation import from_euler, product
 from .rows import Rows, padded, rows_of
@@ -181,7 +181,7 @@ class _Steps:
         self._told(float(self._done), float(self._of))
 
 
-@eqx.filter_jit
+@compiled
 def _forward(
     filter: AbstractFilter, state: FilterState, samples: Sample, arm: Float[Array, "3"]
 ) -> tuple[FilterState, _Seen]:
@@ -197,7 +197,7 @@ def _forward(
     return jax.lax.scan(step, state, samples)
 
 
-@eqx.filter_jit
+@compiled
 def _likelihoods(filter: AbstractFilter, starts: Float[Array, "h n"], samples: Sample) -> Float[Array, " h"]:
     """Log likelihood of the samples from each of the starts."""
 

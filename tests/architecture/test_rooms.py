@@ -107,6 +107,17 @@ def test_file_is_short_and_says_what_it_is_for(path):
     assert ast.get_docstring(ast.parse(text))
 
 
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOUSE)))
+def test_a_function_that_is_compiled_keeps_its_programs(path):
+    """Claim: functions are compiled by `programs.compiled`, so that a later process need not trace them."""
+    decorators = [d for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) for d in _decorators(node)]
+    assert not [one for one in decorators if "filter_jit" in one]
+
+
+def _decorators(node):
+    return [ast.unparse(decorator) for decorator in getattr(node, "decorator_list", [])]
+
+
 def test_importing_every_module_prints_nothing_changes_no_setting_and_starts_no_backend():
     modules = sorted(
         ".".join(("jaxsub", *path.relative_to(HOUSE).with_suffix("").parts)).removesuffix(".__init__")
