@@ -29,7 +29,5 @@ def next_run(diagnosis: Conclusions, train: Sequence[Recording]) -> Manoeuvre | 
 
 def said(found: Manoeuvre, file: str) -> str:
     """One sentence on a manoeuvre that was written to `file`."""
-    gain = (
-        f"{sized(found.separation)} (χ² between the closest two; {sized(found.before)} with the inputs recorded here)"
-    )
+    gain = f"{found.separation:.3g} (χ² between the closest two; {found.before:.3g} with the inputs recorded here)"
     return f"The inputs in {file}, found for this vehicle within the limits it kept, should tell them apart by {gain}."
