@@ -140,7 +140,7 @@ class Sweep(AbstractResult):
 
     @classmethod
     def load(cls, folder: str | Path) -> "Sweep":
-        """The sweep that the command or `save` left in `folder`. **Raises** `InputError` where there is none."""
+        """The sweep in `folder`, written by the command or from Python. **Raises** `InputError` where there is none."""
         import xarray
 
         place = Path(folder)
