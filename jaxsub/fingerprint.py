@@ -8,7 +8,6 @@ import dataclasses
 import enum
 import functools
 import hashlib
-import importlib.metadata
 import platform
 import sys
 import types
@@ -21,7 +20,8 @@ import jax
 import numpy as np
 from jax.core import Tracer
 
-_LIBRARIES = ("equinox", "jax", "jaxlib", "jaxtyping", "lineax", "numpy", "optax", "optimistix")
+# whose objects a program may hold: their versions are in the digest
+_LIBRARIES = ("diffrax", "equinox", "jax", "jaxlib", "jaxtyping", "lineax", "numpy", "optax", "optimistix")
 _STANDARD = ("builtins", "collections", "enum", "functools", "math", "operator", "types", "typing")
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(Ellipsis), np.dtype)
 
@@ -42,13 +42,18 @@ def digest(function: Callable, arguments: Any) -> str:
 
 @functools.cache
 def surroundings() -> str:
-    """A digest of what every program depends on: jaxsub's sources, versions of libraries, the kind of device."""
+    """A digest of what every program depends on: jaxsub's sources, what is installed, the kind of device."""
     found, folder = hashlib.sha256(), Path(__file__).parent
     for path in sorted(folder.rglob("*.py")):
         found.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
-    versions = [f"{name} {importlib.metadata.version(name)}" for name in _LIBRARIES]
-    found.update("\n".join([*versions, sys.version, platform.machine(), jax.default_backend()]).encode())
+    found.update("\n".join([*_installed(), sys.version, platform.machine(), jax.default_backend()]).encode())
     return found.hexdigest()
+
+
+def _installed() -> list[str]:
+    """Names and versions of installed packages, as their folders have them: any may be called in a traced function."""
+    found = {path.name for place in map(Path, sys.path) if place.is_dir() for path in place.glob("*.dist-info")}
+    return sorted(found)
 
 
 class _Walk:
