@@ -59,7 +59,7 @@ def rows_of(log: SensorLog, suite: SensorSuite) -> Rows:
     outputs, masks, scales, used = [], [], [], {}
     for sensor in suite.aiding:
         values, scale = _measured(log, sensor)
-        mask = np.isfinite(values).all(axis=1)
+        mask = np.all(np.isfinite(values), axis=1)
         used[sensor.name] = int(mask.sum())
         if sensor.kind == "magnetometer":
             magnetometer = np.where(mask[:, None], values, 0.0)
@@ -98,7 +98,7 @@ def sigmas(sensor: Sensor, origin: tuple[float, float] | None) -> np.ndarray:
 def _driving(log: SensorLog, sensor: Sensor, findings: list[Finding]) -> tuple[np.ndarray, ...]:
     """Readings (K, 3) at each row, over the interval before it, and by how much they may be wrong all through it."""
     read, times = log.readings[sensor.name], log.times
-    good = np.isfinite(read).all(axis=1)
+    good = np.all(np.isfinite(read), axis=1)
     if good.sum() < 2:
         raise InputError(log.source, f"has {good.sum()} samples of {sensor.name}", "give a log with at least two")
     whole = np.stack([np.interp(times, times[good], column[good]) for column in read.T], axis=1)
