@@ -9,7 +9,7 @@ from experiments.real_recordings import emps, rolldecay, seaglider, silverbox, s
 from experiments.real_recordings.by_hand import free_run_errors
 from experiments.real_recordings.preparation import held_means, mid_interval
 from experiments.real_recordings.run import in_field_units
-from jaxsub.discrepancy.diagnosis import Estimate
+from jaxsub.discrepancy.diagnosis import ParameterEstimate
 from jaxsub.recording import Recording
 from jaxsub.vehicle import read_vehicle
 
@@ -88,6 +88,6 @@ def test_free_run_errors_find_the_start_and_nothing_else(tmp_path):
 
 
 def test_estimates_are_written_as_their_field_does():
-    found = in_field_units("kappa", Estimate(4e-10, 1e-11, "1/Pa"), {"kappa": (1e4, "1/dbar")})
+    found = in_field_units("kappa", ParameterEstimate(4e-10, 1e-11, "1/Pa"), {"kappa": (1e4, "1/dbar")})
     assert found == {"value": pytest.approx(4e-6), "standard_error": pytest.approx(1e-7), "unit": "1/dbar"}
-    assert in_field_units("x", Estimate(2.0, 1.0, "m"), {})["unit"] == "m"
+    assert in_field_units("x", ParameterEstimate(2.0, 1.0, "m"), {})["unit"] == "m"

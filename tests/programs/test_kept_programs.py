@@ -153,7 +153,7 @@ _SAME_LINE = [lambda x: x + 1.0, lambda x: x + 2.0]
         (jnp.cumsum, jnp.cumprod),
         (_SAME_LINE[0], _SAME_LINE[1]),
     ],
-    ids=str,
+    ids=lambda part: type(part).__name__,
 )
 def test_what_a_program_depends_on_changes_its_digest(trusted, one, other):
     """Two things that a trace would tell apart have two digests, and each has the same one again."""
@@ -176,7 +176,7 @@ def _itself():
     return ring
 
 
-@pytest.mark.parametrize("what", [_itself(), object(), iter([1.0]), _Own(1.0)], ids=str)
+@pytest.mark.parametrize("what", [_itself(), object(), iter([1.0]), _Own(1.0)], ids=lambda part: type(part).__name__)
 def test_what_is_not_known_has_no_digest(what):
     """Objects of unknown kinds or from elsewhere, and rings, are refused rather than guessed."""
     with pytest.raises(NoDigestError):
