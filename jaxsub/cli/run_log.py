@@ -1,18 +1,18 @@
 """What a folder of results was made by: `run.json`, with the command's settings, its inputs and the versions."""
 
-import hashlib
 import os
+import platform
 import sys
 import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ..plain import to_json
+from ..storage import contents, installed_version
 
 RUN_LOG = "run.json"
 # what computes; a result may differ in its last digits by their versions
@@ -23,7 +23,8 @@ _VARIABLES = ("JAX_PLATFORMS", "JAX_ENABLE_X64", "XLA_FLAGS", "JAXSUB_DATA")
 
 def versions() -> dict[str, str]:
     """Versions of jaxsub, Python and the libraries that compute, by name."""
-    return {name: _version(name) for name in ("jaxsub", "python", *_LIBRARIES)}
+    own = {"jaxsub": installed_version("jaxsub"), "python": platform.python_version()}
+    return own | {name: installed_version(name) for name in _LIBRARIES}
 
 
 def device() -> str:
@@ -60,15 +61,6 @@ class RunLog:
         }
 
 
-def _version(name: str) -> str:
-    if name == "python":
-        return sys.version.split()[0]
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:  # a checkout that nobody installed
-        return "not installed"
-
-
 def _plain(value: Any) -> Any:
     """A setting as JSON has it."""
     if isinstance(value, tuple | list):
@@ -78,11 +70,4 @@ def _plain(value: Any) -> Any:
 
 def _file(path: Path) -> dict[str, Any]:
     """An input's size and digest, by which it is known again; of a folder its name alone."""
-    if not path.is_file():
-        return {"path": str(path)}
-    with path.open("rb") as file:
-        return {
-            "path": str(path),
-            "size": path.stat().st_size,
-            "sha256": hashlib.file_digest(file, "sha256").hexdigest(),
-        }
+    return {"path": str(path), **(contents(path) if path.is_file() else {})}

@@ -44,17 +44,13 @@ class Manifest:
         with locked(self.path.parent):
             if self._lines():
                 return
-            try:
-                version = metadata.version("jaxsub")
-            except metadata.PackageNotFoundError:  # a checkout that nobody installed
-                version = "not installed"
-            self._append({"schema": _SCHEMA, "jaxsub": version, "command": command})
+            self._append({"schema": _SCHEMA, "jaxsub": installed_version("jaxsub"), "command": command})
 
     def add(self, file: Path, content: Path | None = None) -> None:
         """List `file` with what it holds, or with what is at `content` and will be moved there."""
         line = {
             "file": file.relative_to(self.path.parent).as_posix(),
-            **_contents(file if content is None else content),
+            **contents(file if content is None else content),
         }
         with locked(self.path.parent):
             self._append(line)
@@ -76,7 +72,7 @@ class Manifest:
             return False
         size = file.stat().st_size
         sized = [line for line in known if line.get("size") == size]
-        return bool(sized) and _contents(file)["sha256"] in [line.get("sha256") for line in sized]
+        return bool(sized) and contents(file)["sha256"] in [line.get("sha256") for line in sized]
 
     def exists(self) -> bool:
         """Whether there is a manifest."""
@@ -125,7 +121,16 @@ class Manifest:
             os.fsync(file.fileno())
 
 
-def _contents(path: Path) -> dict[str, Any]:
+def installed_version(package: str) -> str:
+    """The version of an installed package."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:  # a checkout that nobody installed
+        return "not installed"
+
+
+def contents(path: Path) -> dict[str, Any]:
+    """Size and SHA-256 of a file, by which it is known again."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         return {"size": os.fstat(file.fileno()).st_size, "sha256": digest}
