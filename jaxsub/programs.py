@@ -57,9 +57,11 @@ class _Compiled:
         self._calls: dict[Hashable, _Call | None] = {}
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        if _Kept.folder is None or jax.local_device_count() > 1:
+            return self._jitted(*args, **kwargs)
         leaves, structure = jax.tree.flatten((args, kwargs))
         arrays = [leaf for leaf in leaves if eqx.is_array(leaf)]
-        if _Kept.folder is None or jax.local_device_count() > 1 or _traced(arrays):
+        if _traced(arrays):
             return self._jitted(*args, **kwargs)
         key = structure, tuple(map(_kind, leaves))
         if key not in self._calls:
