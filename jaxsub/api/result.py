@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from ..storage import Manifest, place, scratch
+from ..storage import Manifest, place, require_ours, scratch
 from .table import Parts, as_html, as_text
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def require_replaceable(out: Path, overwrite: bool) -> None:
         return
     if not overwrite:
         raise InputError(str(out), "already exists", "choose another path, or give overwrite=True")
-    manifest = Manifest.of_folder(out)
-    if out.is_symlink() or not out.is_dir() or not manifest.exists() or manifest.foreign() is not None:
-        what = "was not written by jaxsub or has changed since, and overwrite replaces nothing else"
-        raise InputError(str(out), what, "choose another path, or remove it yourself")
+    remedy = "choose another path, or remove it yourself"
+    if out.is_symlink() or not out.is_dir():
+        raise InputError(str(out), "was not written by jaxsub as a folder, and overwrite replaces nothing else", remedy)
+    require_ours(out, "overwrite", remedy)

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from ..errors import InputError, OutputError
-from ..storage import Manifest, place, scratch
+from ..storage import Manifest, place, require_ours, scratch
 from ..storage.whole import flush
 from .options import options
 from .run_log import RunLog
@@ -39,7 +39,7 @@ def require_replaceable(out: Path, overwrite: bool, inputs: Sequence[Path] = ())
         if os.path.lexists(out):
             if not overwrite:
                 raise InputError(str(out), "already exists", f"{_ANOTHER} or add --overwrite")
-            _require_ours(out)
+            require_ours(out, "--overwrite", f"{_ANOTHER} or remove it yourself")
         parent = next(path for path in out.absolute().parents if os.path.lexists(path))
         if not parent.is_dir():
             raise InputError(str(out), f"{parent} is not a folder", _ANOTHER)
@@ -71,19 +71,6 @@ def require_apart(out: Path, inputs: Sequence[Path]) -> None:
 def _real(path: Path) -> Path:
     """The path without links, as far as they lead; `Path.resolve` raises where they lead in a circle before 3.13."""
     return Path(os.path.realpath(path))
-
-
-def _require_ours(out: Path) -> None:
-    """Raise `InputError` unless all that is at `out` was written by jaxsub and is as it was written."""
-    remedy = f"{_ANOTHER} or remove it yourself"
-    manifest = Manifest.of_folder(out) if out.is_dir() else Manifest.of_file(out)
-    if not manifest.exists():
-        what = f"was not written by jaxsub: there is no manifest {manifest.path}"
-        raise InputError(str(out), f"{what}, and --overwrite replaces nothing else", remedy)
-    other = manifest.foreign() if out.is_dir() else None if manifest.lists(out) else out
-    if other is not None:
-        what = "was not written by jaxsub or has changed since, and --overwrite replaces nothing else"
-        raise InputError(str(other), what, remedy)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from ..plain import to_json
-from ..storage import contents, installed_version
+from ..storage import installed_version, size_and_digest
 
 RUN_LOG = "run.json"
 # what computes; a result may differ in its last digits by their versions
@@ -70,4 +70,4 @@ def _plain(value: Any) -> Any:
 
 def _file(path: Path) -> dict[str, Any]:
     """An input's size and digest, by which it is known again; of a folder its name alone."""
-    return {"path": str(path), **(contents(path) if path.is_file() else {})}
+    return {"path": str(path), **(size_and_digest(path) if path.is_file() else {})}

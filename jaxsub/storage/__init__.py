@@ -1,6 +1,6 @@
 """Files and folders that appear whole or not at all, and manifests of what jaxsub wrote."""
 
-from .manifest import MANIFEST, Manifest, contents, installed_version
+from .manifest import MANIFEST, Manifest, installed_version, require_ours, size_and_digest
 from .temporary import abandon, clear_dead, scratch
 from .whole import exchange, place, written_whole
 
@@ -9,10 +9,11 @@ __all__ = [
     "Manifest",
     "abandon",
     "clear_dead",
-    "contents",
     "exchange",
     "installed_version",
     "place",
+    "require_ours",
     "scratch",
+    "size_and_digest",
     "written_whole",
 ]

@@ -17,6 +17,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from ..errors import InputError
 from .temporary import is_dead, locked, scratch_folders
 
 MANIFEST = ".jaxsub.jsonl"
@@ -50,7 +51,7 @@ class Manifest:
         """List `file` with what it holds, or with what is at `content` and will be moved there."""
         line = {
             "file": file.relative_to(self.path.parent).as_posix(),
-            **contents(file if content is None else content),
+            **size_and_digest(file if content is None else content),
         }
         with locked(self.path.parent):
             self._append(line)
@@ -72,7 +73,7 @@ class Manifest:
             return False
         size = file.stat().st_size
         sized = [line for line in known if line.get("size") == size]
-        return bool(sized) and contents(file)["sha256"] in [line.get("sha256") for line in sized]
+        return bool(sized) and size_and_digest(file)["sha256"] in [line.get("sha256") for line in sized]
 
     def exists(self) -> bool:
         """Whether there is a manifest."""
@@ -121,6 +122,21 @@ class Manifest:
             os.fsync(file.fileno())
 
 
+def require_ours(out: Path, overwrite: str, remedy: str) -> None:
+    """Raise `InputError` unless all that is at `out` was written by jaxsub and is as it was written.
+
+    `overwrite` is the option that would replace it.
+    """
+    manifest = Manifest.of_folder(out) if out.is_dir() else Manifest.of_file(out)
+    if not manifest.exists():
+        what = f"was not written by jaxsub: there is no manifest {manifest.path}"
+        raise InputError(str(out), f"{what}, and {overwrite} replaces nothing else", remedy)
+    other = manifest.foreign() if out.is_dir() else None if manifest.lists(out) else out
+    if other is not None:
+        what = f"was not written by jaxsub or has changed since, and {overwrite} replaces nothing else"
+        raise InputError(str(other), what, remedy)
+
+
 def installed_version(package: str) -> str:
     """The version of an installed package."""
     try:
@@ -129,7 +145,7 @@ def installed_version(package: str) -> str:
         return "not installed"
 
 
-def contents(path: Path) -> dict[str, Any]:
+def size_and_digest(path: Path) -> dict[str, Any]:
     """Size and SHA-256 of a file, by which it is known again."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
