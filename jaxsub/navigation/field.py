@@ -13,7 +13,7 @@ import numpy as np
 
 from ..findings import Finding
 from .suite import Sensor, SensorSuite
-from .suite.log import SensorLog
+from .suite.log import SensorLog, interpolated
 
 # s: delays that are tried, and the window's length; samples that it has at least
 _EARLIEST, _LATEST, _STEP, _WINDOW, _LEAST = -0.05, 0.15, 0.005, 0.1, 8
@@ -94,11 +94,11 @@ def _open(log: SensorLog, sensor: Sensor, what: str, remedy: str) -> Finding:
 
 def fit_field(log: SensorLog, suite: SensorSuite, sensor: Sensor) -> FieldFit:
     """Delay beyond the stated one and hard iron by least squares over all of the log."""
-    times, m = _known(log, sensor.name)
-    gyro_times, rate = _known(log, suite.only("gyro").name)
+    times, m = log.complete(sensor.name)
+    gyro_times, rate = log.complete(suite.only("gyro").name)
     interval = float(np.median(np.diff(times)))
     grid = np.arange(times[0], times[-1], interval)
-    field = _onto(grid, times, m)
+    field = interpolated(grid, times, m)
     length = max(_LEAST, round(_WINDOW / interval)) + 1
     # with two zeros at each end the slope is of central differences all through
     window = np.pad(np.hanning(length + 2), 1)
@@ -108,7 +108,7 @@ def fit_field(log: SensorLog, suite: SensorSuite, sensor: Sensor) -> FieldFit:
     average = Averaged(window)
     left = Averaged(slope)(field)
     held = np.stack([average(_cross(field)[:, :, i]) for i in range(3)], axis=2)
-    at = lambda lag: _system(left, held, average, field, _onto(grid - sensor.delay - lag, gyro_times, rate))
+    at = lambda lag: _system(left, held, average, field, interpolated(grid - sensor.delay - lag, gyro_times, rate))
     lags = np.arange(_EARLIEST, _LATEST + 0.5 * _STEP, _STEP)
     loss = np.array([_solved(*at(lag))[1] for lag in lags])
     lowest = int(np.argmin(loss))
@@ -160,13 +160,3 @@ def _cross(v: np.ndarray) -> np.ndarray:
     x, y, z = v.T
     zero = np.zeros_like(x)
     return np.stack([np.stack([zero, -z, y], 1), np.stack([z, zero, -x], 1), np.stack([-y, x, zero], 1)], 1)
-
-
-def _known(log: SensorLog, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of a sensor's complete samples."""
-    good = np.isfinite(log.readings[name]).all(axis=1)
-    return log.times[good], log.readings[name][good]
-
-
-def _onto(grid: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.stack([np.interp(grid, times, column) for column in values.T], axis=1)

@@ -1,7 +1,6 @@
 """From readings of raw sensors to attitude, velocity and position with standard deviations."""
 
 import dataclasses
-import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -24,7 +23,7 @@ from ..filter import (
 from ..findings import Finding
 from ..programs import compiled
 from .field import FieldFit, with_field
-from .rotation import from_euler, product
+from .rotation import turned
 from .rows import Rows, padded, rows_of
 from .start import Start, start_of
 from .suite import SensorSuite
@@ -221,8 +220,9 @@ def _log_likelihood(estimate: Estimate) -> Float[Array, ""]:
 
 def _likeliest(filter: ExtendedKalmanFilter, x: np.ndarray, rows: Rows, K: int) -> np.ndarray:
     """The start among eight headings that makes the first K rows most likely."""
-    turn = lambda heading: np.asarray(product(from_euler(jnp.array([0.0, 0.0, heading])), jnp.asarray(x[:4])))
-    starts = np.stack([np.concatenate([turn(2.0 * math.pi * i / _HEADINGS), x[4:]]) for i in range(_HEADINGS)])
+    headings = 2.0 * jnp.pi * jnp.arange(_HEADINGS) / _HEADINGS
+    attitudes = jax.vmap(turned, (None, 0))(jnp.asarray(x[:4]), headings)
+    starts = np.concatenate([attitudes, np.tile(x[4:], (_HEADINGS, 1))], axis=1)
     samples = padded(rows.samples, 0, K, _BLOCK * -(-K // _BLOCK))
     found = np.asarray(_likelihoods(filter, jnp.asarray(starts), samples))
     return starts[int(np.argmax(np.where(np.isfinite(found), found, -np.inf)))]

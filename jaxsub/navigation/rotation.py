@@ -127,6 +127,11 @@ def from_euler(angles: Float[Array, "3"]) -> Float[Array, "4"]:
     )
 
 
+def turned(q: Float[Array, "4"], heading: Float[Array, ""]) -> Float[Array, "4"]:
+    """q with its yaw increased by `heading`, rad: turned about the vertical."""
+    return product(from_euler(jnp.zeros(3).at[2].set(heading)), q)
+
+
 def wrapped(angle: Float[Array, "*k"]) -> Float[Array, "*k"]:
     """The angle less whole turns, in (-π, π]."""
     return angle - 2.0 * jnp.pi * jnp.ceil(angle / (2.0 * jnp.pi) - 0.5)

@@ -15,7 +15,7 @@ from ..vehicle.sensors.water import depth_at
 from .aided import AidedInputs
 from .strapdown import Inertial
 from .suite import Sensor, SensorSuite
-from .suite.log import SensorLog
+from .suite.log import SensorLog, interpolated
 
 # intervals between samples, and s, above which inertial readings are lost rather than sparse
 _SPARSE, _LEAST_GAP = 5.0, 0.1
@@ -101,7 +101,7 @@ def _driving(log: SensorLog, sensor: Sensor, findings: list[Finding]) -> tuple[n
     good = np.all(np.isfinite(read), axis=1)
     if good.sum() < 2:
         raise InputError(log.source, f"has {good.sum()} samples of {sensor.name}", "give a log with at least two")
-    whole = np.stack([np.interp(times, times[good], column[good]) for column in read.T], axis=1)
+    whole = interpolated(times, times[good], read[good])
     usual = np.maximum(np.std(read[good], axis=0), 1e-3)
     stop = _at_stop(read, sensor)
     if stop.any():

@@ -6,14 +6,16 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from ..effects import GRAVITY
 from .aided import SCALES
 from .alignment import MagneticField, aligned
+from .rotation import turned
 from .suite import SensorSuite
-from .suite.log import SensorLog
+from .suite.log import SensorLog, interpolated
 
 # s from which rest is judged; rad/s and m/s² by which readings of a unit at rest differ at most, rms
 _WINDOW, _STILL_RATE, _STILL_FORCE = 1.0, math.radians(0.5), 0.2
-_GRAVITY, _NEAR_GRAVITY = 9.80665, 0.5
+_NEAR_GRAVITY = 0.5
 # standard deviations at rest: tilt, heading by a field, velocity; in motion: tilt, velocity
 _REST = (0.02, 0.05, 0.1)
 _MOVING = (0.3, 5.0)
@@ -41,13 +43,10 @@ def field_of(log: SensorLog, suite: SensorSuite) -> MagneticField | None:
     found = suite.of("magnetometer")
     if not found:
         return None
-    seen, force = log.readings[found[0].name], log.readings[suite.only("accelerometer").name]
-    both = np.isfinite(seen).all(axis=1)
-    times = log.times
-    good = np.isfinite(force).all(axis=1)
-    held = np.stack([np.interp(times[both], times[good], column[good]) for column in force.T], axis=1)
-    strength = np.linalg.norm(seen[both], axis=1)
-    along = -np.sum(seen[both] * held, axis=1) / np.maximum(np.linalg.norm(held, axis=1) * strength, 1e-300)
+    times, seen = log.complete(found[0].name)
+    held = interpolated(times, *log.complete(suite.only("accelerometer").name))
+    strength = np.linalg.norm(seen, axis=1)
+    along = -np.sum(seen * held, axis=1) / np.maximum(np.linalg.norm(held, axis=1) * strength, 1e-300)
     size, dip = float(np.median(strength)), float(np.median(np.arcsin(np.clip(along, -1.0, 1.0))))
     spread = found[0].sigma[0] if found[0].sigma[0] > 0.0 else FIELD_SPREAD * size
     return MagneticField(size * math.cos(dip), size * math.sin(dip), spread)
@@ -56,12 +55,10 @@ def field_of(log: SensorLog, suite: SensorSuite) -> MagneticField | None:
 def start_of(log: SensorLog, suite: SensorSuite) -> Start:
     """The start of a log: levelled by its first second, with the heading of a field or a compass where there is one."""
     gyro, accelerometer = suite.only("gyro"), suite.only("accelerometer")
-    first = log.times <= log.times[0] + _WINDOW
-    early = lambda name: log.readings[name][first & np.isfinite(log.readings[name]).all(axis=1)]
-    rates, forces = early(gyro.name), early(accelerometer.name)
-    force = _first_mean(log, accelerometer.name, forces)
+    rates, forces = _early(log, gyro.name), _early(log, accelerometer.name)
+    force = forces.mean(axis=0) if len(forces) else log.complete(accelerometer.name)[1][0]
     rest = _at_rest(rates, forces)
-    fields = [early(sensor.name) for sensor in suite.of("magnetometer")]
+    fields = [_early(log, sensor.name) for sensor in suite.of("magnetometer")]
     field = fields[0].mean(axis=0) if fields and len(fields[0]) else np.full(3, np.nan)
     found = aligned(jnp.asarray(force), jnp.asarray(field))
     tilt, turn, slow = _REST if rest else (_MOVING[0], _MOVING[0], _MOVING[1])
@@ -79,9 +76,10 @@ def start_of(log: SensorLog, suite: SensorSuite) -> Start:
     return Start(x, std, rest, heading)
 
 
-def _first_mean(log: SensorLog, name: str, early: np.ndarray) -> np.ndarray:
-    read = log.readings[name]
-    return early.mean(axis=0) if len(early) else read[np.isfinite(read).all(axis=1)][0]
+def _early(log: SensorLog, name: str) -> np.ndarray:
+    """A sensor's complete samples from which rest is judged."""
+    times, values = log.complete(name)
+    return values[times <= log.times[0] + _WINDOW]
 
 
 def _at_rest(rates: np.ndarray, forces: np.ndarray) -> bool:
@@ -89,7 +87,7 @@ def _at_rest(rates: np.ndarray, forces: np.ndarray) -> bool:
         return False
     turning = float(np.sqrt(np.mean(np.sum((rates - rates.mean(axis=0)) ** 2, axis=1))))
     size = np.linalg.norm(forces, axis=1)
-    uneven, off = float(size.std()), float(abs(size.mean() - _GRAVITY))
+    uneven, off = float(size.std()), float(abs(size.mean() - GRAVITY))
     return turning < _STILL_RATE and uneven < _STILL_FORCE and off < _NEAR_GRAVITY
 
 
@@ -98,30 +96,21 @@ def _heading(
 ) -> tuple[np.ndarray, str, float]:
     """The attitude with its heading, how that is known, and its standard deviation, rad."""
     for sensor in suite.of("compass"):
-        read = log.readings[sensor.name][:, 0]
-        return _turned(q, float(read[np.isfinite(read)][0])), "measured", max(turn, sensor.sigma[0])
+        first = jnp.asarray(log.complete(sensor.name)[1][0, 0])
+        return np.asarray(turned(jnp.asarray(q), first)), "measured", max(turn, sensor.sigma[0])
     for sensor in suite.of("magnetometer"):
         if by_field:
-            return _turned(q, sensor.declination), "measured", turn
+            return np.asarray(turned(jnp.asarray(q), jnp.asarray(sensor.declination))), "measured", turn
     if suite.of("gps", "usbl", "velocity"):
         return q, "unknown", turn
     return q, "relative", 1e-3
-
-
-def _turned(q: np.ndarray, heading: float) -> np.ndarray:
-    """q turned about the vertical; a compass's heading is all of it where no field gave one."""
-    half = 0.5 * heading
-    w, x, y, z = q
-    c, s = math.cos(half), math.sin(half)
-    return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
 
 
 def _first_motion(log: SensorLog, suite: SensorSuite) -> tuple[np.ndarray, np.ndarray, float]:
     """Velocity zero, position by the first fixes, and the position's standard deviation, m."""
     position, place = np.zeros(3), 0.1
     for sensor in (*suite.of("gps", "usbl"), *suite.of("pressure", "depth")):
-        read = log.readings[sensor.name]
-        row = read[np.isfinite(read).all(axis=1)][0]
+        row = log.complete(sensor.name)[1][0]
         if sensor.kind in ("pressure", "depth"):
             position[2] = row[0]
         else:

@@ -6,7 +6,9 @@ Source: Groves (2013), Principles of GNSS, inertial and multisensor integrated n
 import math
 from typing import NamedTuple
 
-_DEGREE, _MILLI_G = math.radians(1.0), 9.80665e-3
+from ...effects import GRAVITY
+
+_DEGREE, _MILLI_G = math.radians(1.0), 1e-3 * GRAVITY
 
 
 class Grade(NamedTuple):

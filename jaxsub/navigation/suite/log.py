@@ -41,6 +41,16 @@ class SensorLog:
     findings: tuple[Finding, ...] = ()
     origin: tuple[float, float] | None = None
 
+    def complete(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Times (k,) and values (k, n) of a sensor's samples in which nothing is missing."""
+        whole = np.all(np.isfinite(self.readings[name]), axis=1)
+        return self.times[whole], self.readings[name][whole]
+
+
+def interpolated(at: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(k, n) values (m, n) of increasing `times` (m,), linear in between, at the times `at` (k,)."""
+    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)
+
 
 def load_sensors(path: Path, suite: SensorSuite) -> SensorLog:
     """The readings that the file or log at `path` holds of a suite's sensors.
