@@ -59,8 +59,7 @@ def fit(vehicle: AbstractVehicle, recordings: Recordings, *, method: str | Abstr
     Maximum likelihood of the simulation error, with an initial state for each run and each output's noise, where the
     vehicle file leaves that open. `recordings` are one or several, checked as `js.check` does: samples that cannot be
     are masked, and a run is cut where time has a hole. `method` is one of the command's, such as `newton` or `mekf`, or
-    an estimator. A search
-    that fails is a value, `Fit.converged`, and no exception.
+    an estimator. A search that fails is a value, `Fit.converged`, and no exception.
 
     **Raises** `InputError` where nothing is free, for recordings that cannot be used, for an unknown method and where
     the model does not run from the values of `vehicle`.

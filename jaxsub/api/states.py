@@ -76,8 +76,7 @@ class States(AbstractResult):
     def whitened(self, run: int) -> np.ndarray:
         """(K, c) innovations of a run in their standard deviations by the filter, NaN where missing or refused."""
         found = self.estimates[run]
-        size = np.linalg.norm(np.asarray(found.factor), axis=-1)
-        return np.where(np.asarray(found.used), np.asarray(found.innovation) / size, np.nan)
+        return np.where(found.used, found.innovation / np.asarray(found.innovation_std), np.nan)
 
     def brief(self) -> Parts:
         """rms of the innovations in their standard deviations, by run and channel: 1 for a consistent filter."""
@@ -102,7 +101,7 @@ class States(AbstractResult):
 
         recording, found, layout = self.recordings[run], self.estimates[run], self.vehicle.layout
         measured = np.stack([recording.column(column) for column in layout.columns], axis=1)
-        size = np.median(np.linalg.norm(np.asarray(found.factor), axis=-1), axis=0)
+        size = np.median(np.asarray(found.innovation_std), axis=0)
         return draw_run(self.vehicle, recording, measured - np.asarray(found.innovation), size)
 
     def recording(self, run: int) -> Recording:

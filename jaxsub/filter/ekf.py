@@ -69,6 +69,11 @@ class Estimate(eqx.Module):
     noise_std: Float[Array, "*k s"]
     diverged: Bool[Array, " *k"]
 
+    @property
+    def innovation_std(self) -> Float[Array, "*k c"]:
+        """(c,) standard deviations of the innovations."""
+        return jnp.linalg.norm(self.factor, axis=-1)
+
 
 class AbstractFilter(eqx.Module):
     """Follows a process and its parameters.

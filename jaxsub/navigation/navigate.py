@@ -189,9 +189,8 @@ def _forward(
 
     def step(state: FilterState, sample: Sample) -> tuple[FilterState, _Seen]:
         state, estimate = filter.step(state, sample)
-        deviations = jnp.linalg.norm(estimate.factor, axis=1)
         track = shown(last(filter, state), sample)
-        return state, _Seen(track, estimate.innovation / deviations, estimate.used)
+        return state, _Seen(track, estimate.innovation / estimate.innovation_std, estimate.used)
 
     return jax.lax.scan(step, state, samples)
 

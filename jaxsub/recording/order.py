@@ -4,8 +4,8 @@ import bisect
 
 import numpy as np
 
-from jaxsub.errors import InputError
-from jaxsub.findings import Finding
+from ..errors import InputError
+from ..findings import Finding
 
 _LEAST = 0.5  # of the rows; a file with fewer in order has no order
 
