@@ -199,13 +199,11 @@ class Sweep(AbstractResult):
 
     def write(self, folder: Path) -> None:
         """Write `sweep.json`, `sweep.nc` and `figures/` into `folder`."""
-        from ..report import sweep_pictures
+        from ..report import sweep_pictures, write_figures
 
         (folder / RESULT).write_text(to_json(self.content), encoding="utf-8")
         self.dataset.to_netcdf(folder / DATA, engine="h5netcdf")
-        (folder / FIGURES).mkdir()
-        for picture in sweep_pictures(self.dataset, self.content):
-            (folder / FIGURES / f"{picture.name}.png").write_bytes(picture.png)
+        write_figures(sweep_pictures(self.dataset, self.content), folder)
 
 
 def _title(case: dict[str, Any]) -> str:

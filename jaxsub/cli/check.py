@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..findings import Finding
 from ..plain import to_json
 from ..recording import Recording
-from ..report import draw_checked_runs
+from ..report import draw_checked_runs, write_figures
 from ..vehicle import AbstractVehicle, read_vehicle
 from . import session, terminal
 from .output import fresh_folder, paths_of
@@ -112,10 +112,8 @@ def _write(
     vehicle: AbstractVehicle, recordings: Sequence[Recording], checked: Checked, content: dict[str, Any], folder: Path
 ) -> None:
     (folder / "check.json").write_text(to_json(content), encoding="utf-8")
-    (folder / "figures").mkdir()
     channels = [(channel.name, channel.unit) for channel in channels_of(vehicle.layout)]
-    for picture in draw_checked_runs(recordings, channels, checked.findings):
-        (folder / "figures" / f"{picture.name}.png").write_bytes(picture.png)
+    write_figures(draw_checked_runs(recordings, channels, checked.findings), folder)
 
 
 def _show(content: dict[str, Any], checked: Checked) -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .checked_runs import draw_checked_runs
-    from .drawing import Picture
+    from .drawing import Picture, write_figures
     from .figures import draw
     from .navigation import write_navigation_report
     from .overlay import draw_run
@@ -18,6 +18,7 @@ __all__ = [
     "draw_checked_runs",
     "draw_run",
     "sweep_pictures",
+    "write_figures",
     "write_navigation_report",
     "write_report",
 ]
@@ -28,6 +29,7 @@ _MODULES = {
     "draw_checked_runs": "checked_runs",
     "draw_run": "overlay",
     "sweep_pictures": "sweeps",
+    "write_figures": "drawing",
     "write_navigation_report": "navigation",
     "write_report": "page",
 }

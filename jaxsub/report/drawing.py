@@ -8,7 +8,8 @@ import contextlib
 import dataclasses
 import functools
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -83,6 +84,14 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         return self.png
+
+
+def write_figures(pictures: Iterable[Picture], folder: Path) -> None:
+    """Write each picture as `figures/NAME.png` into `folder`."""
+    figures = folder / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    for picture in pictures:
+        (figures / f"{picture.name}.png").write_bytes(picture.png)
 
 
 def style() -> contextlib.AbstractContextManager[None]:

@@ -20,6 +20,7 @@ from .drawing import (
     png,
     style,
     thin,
+    write_figures,
 )
 from .page import environment
 
@@ -31,10 +32,7 @@ def write_navigation_report(found: Navigation, content: dict[str, Any], folder: 
     """Write `report.html`, which needs no other file, and `figures/*.png` into `folder`; `content` is the summary."""
     with style():
         pictures = {picture.name: picture for picture in (_motion(found), _track(found), _innovations(found))}
-    figures = folder / "figures"
-    figures.mkdir(parents=True, exist_ok=True)
-    for name, picture in pictures.items():
-        (figures / f"{name}.png").write_bytes(picture.png)
+    write_figures(pictures.values(), folder)
     page = environment().get_template("navigation.html.j2").render(found=content, pictures=pictures)
     (folder / "report.html").write_text(page, encoding="utf-8")
 

@@ -11,7 +11,7 @@ from ..discrepancy.decisions import decision_rows
 from ..discrepancy.diagnosis import Conclusions
 from . import tables, text
 from .bars import top_candidates
-from .drawing import Picture
+from .drawing import Picture, write_figures
 from .figures import draw
 from .forces import is_equation, telling_trace
 from .overlay import telling_overlay
@@ -37,10 +37,7 @@ def write_report(diagnosis: Conclusions, vehicle_text: str, folder: Path) -> Non
     `vehicle_text` is the improved vehicle file, of which the page shows the effects. Existing files are replaced.
     """
     pictures = draw(diagnosis)
-    figures = folder / "figures"
-    figures.mkdir(parents=True, exist_ok=True)
-    for name, picture in pictures.items():
-        (figures / f"{name}.png").write_bytes(picture.png)
+    write_figures(pictures.values(), folder)
     (folder / "report.html").write_text(render(diagnosis, vehicle_text, pictures), encoding="utf-8")
 
 
