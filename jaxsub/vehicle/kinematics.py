@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..arrays import Values, namespace
 from ..effects import GRAVITY, Motion, Signal
 
 
@@ -47,15 +48,18 @@ def position_rates(motion: Motion) -> dict[str, Signal]:
     }
 
 
-def rotation(phi: Float[Array, " *k"], theta: Float[Array, " *k"], psi: Float[Array, " *k"]) -> Float[Array, "*k 3 3"]:
+def rotation(
+    phi: Float[Values, " *k"], theta: Float[Values, " *k"], psi: Float[Values, " *k"]
+) -> Float[Values, "*k 3 3"]:
     r"""$R(\phi, \theta, \psi) = R_z(\psi)R_y(\theta)R_x(\phi)$, angles in rad: from turned axes to the fixed ones."""
-    (sf, cf), (st, ct), (sp, cp) = ((jnp.sin(angle), jnp.cos(angle)) for angle in (phi, theta, psi))
+    xp = namespace(phi, theta, psi)
+    (sf, cf), (st, ct), (sp, cp) = ((xp.sin(angle), xp.cos(angle)) for angle in (phi, theta, psi))
     rows = (
         (cp * ct, cp * st * sf - sp * cf, cp * st * cf + sp * sf),
         (sp * ct, sp * st * sf + cp * cf, sp * st * cf - cp * sf),
         (-st, ct * sf, ct * cf),
     )
-    return jnp.stack([jnp.stack(jnp.broadcast_arrays(*row, cp * ct)[:3], -1) for row in rows], -2)
+    return xp.stack([xp.stack(xp.broadcast_arrays(*row, cp * ct)[:3], -1) for row in rows], -2)
 
 
 def specific_force(

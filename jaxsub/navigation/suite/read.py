@@ -10,7 +10,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...units import UnknownUnit, same_dimension
+from ...vehicle.kinematics import rotation
 from ...vehicle.schema import Table, read_finite, read_positive
+from ...vehicle.sensors.read import read_latitude, read_origin, refuse_two_densities
 from ...vehicle.toml import check_tree, read_toml
 from .grades import GRADES, Grade
 from .suite import KINDS, RULES, Kind, Motion, Sensor, SensorSuite, Vector
@@ -20,7 +22,7 @@ _MOST = 50
 _CALIBRATIONS = ("none", "hard-iron")
 # s, standard deviation of a delay that is to be estimated
 _DELAY_STD = 0.1
-_HALF_TURN, _QUARTER = math.pi, 0.5 * math.pi
+_HALF_TURN = math.pi
 _DENSEST = 2000.0  # kg/m³
 
 
@@ -73,8 +75,8 @@ def _sensor(table: Table, name: str) -> Sensor:
     given["sigma"] = _sigma(table, known, channels)
     if kind in GRADES:
         given["noise"] = _noise(table, kind)
-    if kind == "pressure" and {"density", "latitude"} <= table.data.keys():
-        raise InputError(table.place("latitude"), "is given beside density", "delete one; sea water's is by latitude")
+    if kind == "pressure":
+        refuse_two_densities(table)
     if kind == "range":
         table.required("beacon")
     return Sensor(name, kind, channels, columns, _units(table, known, channels), **given)
@@ -189,21 +191,11 @@ def _mounting(table: Table, key: str) -> tuple[Vector, Vector, Vector]:
             raise InputError(place, f"is {entry!r:.60}", remedy)
         R = np.stack([signs[item] for item in entry], axis=1)
     else:
-        roll, pitch, yaw = (read_finite(item, place) for item in entry)
-        about = lambda axis, angle: _turn(axis, math.cos(angle), math.sin(angle))
-        R = about(2, yaw) @ about(1, pitch) @ about(0, roll)
+        R = rotation(*(np.asarray(read_finite(item, place)) for item in entry))
     if not np.isclose(np.linalg.det(R), 1.0):
         raise InputError(place, f"{entry!r:.60} is no rotation", "turn the axes, and mirror none")
     first, second, third = (tuple(row) for row in R.tolist())
     return first, second, third
-
-
-def _turn(axis: int, cosine: float, sine: float) -> np.ndarray:
-    R = np.eye(3)
-    one, other = (axis + 1) % 3, (axis + 2) % 3
-    R[[one, other], [one, other]] = cosine
-    R[one, other], R[other, one] = -sine, sine
-    return R
 
 
 def _vector(table: Table, key: str) -> Vector:
@@ -212,19 +204,6 @@ def _vector(table: Table, key: str) -> Vector:
         raise InputError(table.place(key), f"is {entry!r:.60}", "give three numbers in m")
     x, y, z = (read_finite(item, table.place(key)) for item in entry)
     return x, y, z
-
-
-def _latitude(entry: Any, place: str) -> float:
-    if abs(latitude := read_finite(entry, place)) >= _QUARTER:
-        raise InputError(place, f"is {latitude:g}", "give a latitude between the poles, in rad")
-    return latitude
-
-
-def _origin(table: Table, key: str) -> tuple[float, float]:
-    entry, place = table.data[key], table.place(key)
-    if not isinstance(entry, list) or len(entry) != 2:
-        raise InputError(place, f"is {entry!r:.60}", "give latitude and longitude in rad")
-    return _latitude(entry[0], place), read_finite(entry[1], place)
 
 
 def _declination(table: Table, key: str) -> float:
@@ -251,9 +230,10 @@ def _positive(table: Table, key: str) -> float:
 
 _READERS: dict[str, Callable[[Table, str], Any]] = {
     "mounting": _mounting, "lever_arm": _vector, "correlation": _not_negative, "delay": _delay, "rate": _positive,
-    "range": _positive, "declination": _declination, "density": _water, "origin": _origin, "beacon": _vector,
+    "range": _positive, "declination": _declination, "density": _water, "beacon": _vector,
     "calibration": lambda table, key: table.choice(key, _CALIBRATIONS),
-    "latitude": lambda table, key: _latitude(table.data[key], table.place(key)),
+    "latitude": lambda table, key: read_latitude(table.data[key], table.place(key)),
+    "origin": lambda table, key: read_origin(table.data[key], table.place(key)),
     "offset": lambda table, key: read_finite(table.data[key], table.place(key)),
 }  # fmt: skip
 

@@ -106,7 +106,7 @@ def _read(table: Table, name: str, known: tuple[str, ...], body: bool, found: Re
             name if several else "",
             directions[i] if directions else STILL,
             *_water(table),
-            _origin(table),
+            read_origin(table.data.get("origin", [0.0, 0.0]), table.place("origin")),
         )
         true = channel_unit(channel) if body else ""
         entries = {key: entries[i] for key, entries in lines.items()}
@@ -200,23 +200,27 @@ def _directions(table: Table) -> list[tuple[float, float, float]]:
 
 def _water(table: Table) -> tuple[float | None, float | None]:
     """Density and latitude by which pressure follows from depth."""
-    if "density" in table.data and "latitude" in table.data:
-        raise InputError(table.place("latitude"), "is given beside density", "delete one; sea water's is by latitude")
+    refuse_two_densities(table)
     density = read_positive(table.data["density"], table.place("density")) if "density" in table.data else None
-    latitude = _latitude(table.data["latitude"], table.place("latitude")) if "latitude" in table.data else None
+    latitude = read_latitude(table.data["latitude"], table.place("latitude")) if "latitude" in table.data else None
     return density, latitude
 
 
-def _origin(table: Table) -> tuple[float, float]:
-    if "origin" not in table.data:
-        return 0.0, 0.0
-    entry, place = table.data["origin"], table.place("origin")
+def refuse_two_densities(table: Table) -> None:
+    """Refuse a density beside the latitude, by which that of sea water follows."""
+    if "density" in table.data and "latitude" in table.data:
+        raise InputError(table.place("latitude"), "is given beside density", "delete one; sea water's is by latitude")
+
+
+def read_origin(entry: Any, place: str) -> tuple[float, float]:
+    """Latitude and longitude, rad, where x and y are zero."""
     if not isinstance(entry, list) or len(entry) != 2:
         raise InputError(place, f"is {entry!r:.60}", "give latitude and longitude in rad")
-    return _latitude(entry[0], place), read_finite(entry[1], place)
+    return read_latitude(entry[0], place), read_finite(entry[1], place)
 
 
-def _latitude(entry: Any, place: str) -> float:
+def read_latitude(entry: Any, place: str) -> float:
+    """A latitude between the poles, rad."""
     latitude = read_finite(entry, place)
     if abs(latitude) >= _QUARTER:
         raise InputError(place, f"is {latitude:g}", "give a latitude between the poles, in rad")
