@@ -18,6 +18,7 @@ from typing import Any, TypeVar, cast
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 from jax import export
 from jax.core import Tracer
 
@@ -149,7 +150,17 @@ def _read(path: Path) -> tuple[export.Exported, Any] | None:
     if hashlib.sha256(content[32:]).digest() != content[:32]:
         return None
     program, result = pickle.loads(content[32:])
+    _load_lapack()
     return export.deserialize(bytearray(program)), result
+
+
+@functools.cache
+def _load_lapack() -> None:
+    """Let JAX find LAPACK, which JAX before 0.10 does only when it lowers a program: one read from disk would crash.
+
+    https://github.com/jax-ml/jax/issues/29610
+    """
+    jax.jit(jax.lax.linalg.cholesky).lower(jnp.eye(1))
 
 
 def _filled(result: Any, arrays: Sequence[Any]) -> Any:
