@@ -1,9 +1,6 @@
 """Recordings as MATLAB files (.mat), of version 4 to 7 and, as HDF5, 7.3, read by pymatreader."""
 
-import pickle
 import struct
-import subprocess
-import sys
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -14,6 +11,7 @@ import numpy as np
 from jaxsub.errors import InputError, optional
 from jaxsub.recording.bounds import most, require_plausible
 from jaxsub.recording.frames import Table
+from jaxsub.recording.matlab_process import read_variables
 from jaxsub.recording.reading import Contents, note, reading
 from jaxsub.units import TIME
 
@@ -22,21 +20,6 @@ _COMPRESSED = 15  # MAT-File Format, table 1-1
 _PIECE = 2**20
 # samples, what they are made into, and both as they are handed over
 _COPIES = 4
-# warnings are about classes that it cannot read; they are refused when they are used; what it takes beside itself is
-# limited where the system says how much that is, since SciPy makes room for a cell array of any size that is claimed
-_READ = """
-import pickle, sys, warnings
-from pathlib import Path
-warnings.simplefilter("ignore")
-import pymatreader
-used = Path("/proc/self/statm")
-if used.exists():
-    import resource
-    most = int(used.read_text().split()[0]) * resource.getpagesize() + int(sys.argv[2])
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
-found = pymatreader.read_mat(sys.argv[1])
-pickle.dump(found, sys.stdout.buffer, protocol=5)
-"""
 _ONE_NUMBER = "give one number a sample or leave the variable out"
 
 
@@ -48,7 +31,7 @@ def read_matlab(path: Path, source: str) -> Contents:
     optional("pymatreader", "files", source)
     with reading(source, "a MATLAB file"):
         _check(path, source)
-        found = _read_apart(path)
+        found = read_variables(path, _COPIES * most(path.stat().st_size))
         tables = dict(_tables({name: value for name, value in found.items() if not name.startswith("__")}))
         if len(tables) > 1:
             listed = ", ".join(name or "the file itself" for name in tables)
@@ -58,21 +41,6 @@ def read_matlab(path: Path, source: str) -> Contents:
         place, values = next(iter(tables.items()), ("", found))
         notes = [note(source, "dialect", f"is read from the struct {place}")] if place else []
         return Contents(_columns(source, values), tuple(notes))
-
-
-def _read_apart(path: Path) -> dict[str, Any]:
-    """The file's variables, read in a process of its own, since some damaged files end the one that SciPy reads in.
-
-    That process may take no more memory than the file plausibly holds.
-    Raises ValueError with the last line of what that process said where it fails.
-    """
-    # -P: modules that lie in the folder where the user stands are none of ours
-    command = [sys.executable, "-P", "-c", _READ, str(path.absolute()), str(_COPIES * most(path.stat().st_size))]
-    done = subprocess.run(command, capture_output=True)
-    if done.returncode:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        raise ValueError(said[-1] if done.returncode > 0 and said else "the reader of MATLAB files breaks off")
-    return pickle.loads(done.stdout)
 
 
 def _check(path: Path, source: str) -> None:

@@ -1,6 +1,7 @@
 """A Parquet or NetCDF recording loads to SI by header or attribute, and what is no column of numbers is refused."""
 
 import gc
+import subprocess
 import sys
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pandas
 import pytest
 import xarray
 from file_examples import WRITERS, U
+from threads import same_in_threads
 
 from jaxsub.errors import InputError
 from jaxsub.recording import load
@@ -95,12 +97,34 @@ def test_damaged_netcdf_is_refused_without_a_complaint_on_stderr(tmp_path, capsy
     assert capsys.readouterr() == ("", "")
 
 
-def test_matlab_file_is_read_without_modules_of_the_current_folder(tmp_path, monkeypatch):
+def test_matlab_file_is_read_without_modules_of_the_current_folder(tmp_path):
     """Claim: a file called as a library, in the folder where the user stands, is not run."""
     WRITERS["packed.mat"](tmp_path / "run.mat")
     (tmp_path / "pymatreader.py").write_text("raise SystemExit('run')")
-    monkeypatch.chdir(tmp_path)
-    np.testing.assert_array_equal(load("run.mat").columns["u"], U)
+    read = "from jaxsub.recording import load; print(*load('run.mat').columns['u'])"
+    done = subprocess.run([sys.executable, "-P", "-c", read], cwd=tmp_path, capture_output=True, text=True, check=True)
+    np.testing.assert_array_equal(np.array(done.stdout.split(), float), U)
+
+
+def test_matlab_files_that_end_their_reader_cost_no_other_file(tmp_path):
+    """Claim: threads that read files beside some that end the process of SciPy's reader get what was written."""
+    WRITERS["mat"](tmp_path / "whole.mat")
+    WRITERS["packed.mat"](tmp_path / "packed.mat")
+    whole = (tmp_path / "whole.mat").read_bytes()
+    for place, byte in ((244, 104), (600, 234), (664, 252), (665, 40)):
+        edited = whole[:place] + bytes([byte]) + whole[place + 1 :]
+        (tmp_path / f"{place}.mat").write_bytes(edited)
+
+    def read(path):
+        try:
+            return [load(path).columns["u"]]
+        except InputError as error:
+            return [np.array(str(error))]
+
+    paths = sorted(tmp_path.glob("*.mat"))
+    assert any("breaks off" in str(read(path)) for path in paths)
+    same_in_threads(read, [(path,) for path in paths], rounds=3)
+    np.testing.assert_array_equal(load(tmp_path / "whole.mat").columns["u"], U)
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not say what a process takes")

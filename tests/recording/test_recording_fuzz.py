@@ -65,11 +65,6 @@ def both(examples: int) -> list[Callable]:
     return [pytest.param(examples), pytest.param(10_000, marks=pytest.mark.long)]
 
 
-def affordable(kind: str, examples: int) -> int:
-    """A third of the few examples of MATLAB files, each of which is read in a process of its own."""
-    return examples // 3 if kind.endswith("mat") and examples < 10_000 else examples
-
-
 @pytest.mark.parametrize("examples", both(200))
 def test_any_bytes_as_text_load_or_are_refused(tmp_path, examples):
     @fuzz(max_examples=examples)
@@ -85,7 +80,7 @@ def test_any_bytes_as_text_load_or_are_refused(tmp_path, examples):
 def test_damaged_binary_file_loads_or_is_refused(tmp_path, kind, examples):
     pytest.importorskip("pymavlink")
 
-    @fuzz(max_examples=affordable(kind, examples))
+    @fuzz(max_examples=examples)
     @given(**damage)
     def loads_or_is_refused(edits, keep, more):
         damaged(tmp_path, kind, edits, keep, more)
@@ -96,7 +91,7 @@ def test_damaged_binary_file_loads_or_is_refused(tmp_path, kind, examples):
 @pytest.mark.parametrize("kind", sorted({kind.rpartition(".")[2] for kind in WRITERS}))
 @pytest.mark.parametrize("examples", both(30))
 def test_any_bytes_as_binary_file_are_refused(tmp_path, kind, examples):
-    @fuzz(max_examples=affordable(kind, examples))
+    @fuzz(max_examples=examples)
     @given(content=st.binary(min_size=1, max_size=300))
     def loads_or_is_refused(content):
         is_loaded_or_refused(tmp_path / f"run.{kind}", content, COLUMNS.get(kind))
