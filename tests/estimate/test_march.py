@@ -106,14 +106,6 @@ CASES = {
 PARAMS = [pytest.param(case, marks=[pytest.mark.long] * (case == "every effect")) for case in CASES]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def optimised():
-    """Bounds are near rounding, so both sides are compiled as a user's are."""
-    jax.config.update("jax_disable_most_optimizations", False)
-    yield
-    jax.config.update("jax_disable_most_optimizations", True)
-
-
 @pytest.fixture(scope="module", params=PARAMS)
 def both(request):
     """A problem, the same on C, and points about its start."""
