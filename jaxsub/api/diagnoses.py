@@ -187,7 +187,7 @@ class Diagnosis(AbstractResult):
         return Table(heads, decision_rows(self.conclusions.decisions))
 
     def plot(self, name: str | None = None) -> "Picture":
-        """A figure of the report: `forces`, `scan`, `before-after`, `checks` or `coefficients`.
+        """A figure of the report: `residual`, `forces`, `by-state`, `scan`, `before-after`, `checks`, `coefficients`.
 
         Without a `name` it is the test run before and after, or the first there is.
 

@@ -83,8 +83,8 @@ class Candidate:
     """One line of the score scan: how much of the residual a candidate would explain.
 
     `statistic` is χ² with `degrees` of freedom under "nothing left out", `p_value` is corrected for all candidates
-    tried, `amplitudes` are the predicted sizes by symbol, `kept` the share of its trace that the coefficients cannot
-    absorb, `outcome` what became of it.
+    tried, `amplitudes` are the predicted sizes by symbol in `units`, `kept` the share of its trace that no coefficient
+    can absorb, `outcome` what became of it.
     """
 
     effect: str
@@ -95,16 +95,30 @@ class Candidate:
     amplitudes: dict[str, float]
     kept: float
     outcome: str
+    units: dict[str, str] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)
 class ForceTrace:
-    """The generalised force that the model lacks in one run, by equation, and its 1-σ band (N or N m)."""
+    """The generalised force that a model lacks in one run, by equation, at its K samples.
+
+    **Fields**
+
+    - `times`: (K,) s. `force`, `band`: (K,) the smoothed force and its standard deviation, N or N m, by equation.
+    - `recorded`, `modelled`: (K,) the force of the effects that were added to the model, N or N m, by equation: as the
+      recordings show it, and by the effects (`effect_forces`).
+    - `states`: (K,) velocities, positions and actuators along the filtered trajectory, SI, by name.
+
+    NaN is what is not known, such as states after the last interval.
+    """
 
     run: str
     times: np.ndarray
     force: dict[str, np.ndarray]
     band: dict[str, np.ndarray]
+    recorded: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    modelled: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    states: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)

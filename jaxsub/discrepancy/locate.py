@@ -15,6 +15,7 @@ from ..likelihood import Disturbance
 from ..recording import Recording
 from .columns import columns_of, differences
 from .diagnosis import ForceTrace, Location, Regime
+from .effect_forces import Forces
 from .evidence import Evidence
 from .process_noise import NoiseSignal
 from .regime import INCIDENCE, regime, regime_variables
@@ -46,14 +47,29 @@ class Field:
     signals: Sequence[NoiseSignal] = ()
 
 
-def traces(view: View, recordings: Sequence[Recording]) -> list[ForceTrace]:
-    """The force that the model lacks in each of `recordings`."""
+def traces(
+    view: View, recordings: Sequence[Recording], effects: tuple[Forces, Forces] | None = None
+) -> list[ForceTrace]:
+    """The force that the model lacks in each of `recordings`, with that of its `effects` by recordings and modelled."""
+    equations, states = view.vehicle.layout.equations, by_name(view.path.start)
     mean, spread = missing_force(view)
     found = []
     for run, recording in enumerate(recordings):
         k = len(recording.times)
-        of = lambda values, run=run, k=k: dict(zip(view.vehicle.layout.equations, values[run, :k].T, strict=True))
-        found.append(ForceTrace(recording.name, recording.times, of(mean), of(spread)))
+        of = lambda values, run=run, k=k: dict(zip(equations, values[run, :k].T, strict=True))
+        # of each interval the start: the last sample begins none
+        at_start = lambda values, run=run, k=k: np.append(values[run, : k - 1], np.nan)
+        by_equation = lambda force, at=at_start: {e: at(force[..., i]) for i, e in enumerate(equations)}
+        found.append(
+            ForceTrace(
+                recording.name,
+                recording.times,
+                of(mean),
+                of(spread),
+                *(({}, {}) if effects is None else (by_equation(effects[0]), by_equation(effects[1]))),
+                {name: at_start(np.asarray(value)) for name, value in states.items() if np.ndim(value) == 2},
+            )
+        )
     return found
 
 

@@ -223,7 +223,8 @@ def table(selector: Selector, scan: Scan) -> list[Candidate]:
         p_value = selector.p_value(int(i), scan)
         kept = float(selector.kept[i]) if selector.usable[i] else 0.0
         said = _outcome(bool(selector.usable[i]), bool(scan.right[i]), p_value)
-        line = Candidate(effect.name, effect.label, statistic, columns, p_value, predicted, kept, said)
+        units = {symbols[field]: unit for field, unit in effect.units().items()}
+        line = Candidate(effect.name, effect.label, statistic, columns, p_value, predicted, kept, said, units)
         lines.setdefault(f"{effect.label} {sorted(symbols.values())}", line)
     return list(lines.values())
 

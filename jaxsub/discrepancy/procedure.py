@@ -16,7 +16,8 @@ from ..vehicle import AbstractVehicle, vehicle_findings
 from .acceptance import Examination, Model, ModelFitter, fitted_model
 from .advice import next_manoeuvre
 from .consistency import consistent
-from .diagnosis import Candidate, Conclusions, Location, Physics, Rival
+from .diagnosis import Candidate, Conclusions, ForceTrace, Location, Physics, Rival
+from .effect_forces import effect_forces
 from .evaluation import overlays
 from .examine import examine
 from .innovation_models import segmented
@@ -135,7 +136,7 @@ class _Account:
             },
             candidates=_became(self.first.naming.candidates, physics, standing),
             forces=field.traces,
-            remaining_forces=traces(best.view, train) if best.added else field.traces,
+            remaining_forces=self._remaining(best),
             overlays=[] if shown is None else overlays(test, layout.measured, shown.before, shown.after),
             coefficients=coefficients({k: float(v) for k, v in vehicle.values().items()}, start, improved),
             channels=channels,
@@ -159,6 +160,12 @@ class _Account:
             complete=judged.complete,
         )
         return diagnosis, improved.vehicle
+
+    def _remaining(self, best: Model) -> list[ForceTrace]:
+        """What the best model lacks, and what its effects are; what the baseline lacks where it is the best."""
+        if not best.added:
+            return self.field.traces
+        return traces(best.view, self.train, effect_forces(self.baseline.view, best.view, best.added))
 
 
 def _findings(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> tuple[Finding, ...]:

@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from ..discrepancy.diagnosis import Candidate, Coefficient, Conclusions
 from .drawing import GREY, IMPROVED, LOCATED, PALE, Picture, drawable, new_figure, png
-from .text import number, power_of_ten
+from .text import number, plain_label, power_of_ten
 
 MOST_CANDIDATES = 12
 _MOST_COEFFICIENTS = 20
@@ -32,7 +32,7 @@ def draw_scan(diagnosis: Conclusions) -> Picture | None:
     axes = figure.subplots()
     statistics = [max(candidate.statistic, 1.0) for candidate in candidates]
     axes.barh(range(len(candidates)), statistics, color=[colors.get(c.label, PALE) for c in candidates], height=0.66)
-    _rows(axes, [candidate.label for candidate in candidates])
+    _rows(axes, [plain_label(candidate.label) for candidate in candidates])
     _logarithmic(axes, max(statistics))
     for row, candidate in enumerate(candidates):
         axes.annotate(

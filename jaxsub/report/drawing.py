@@ -122,7 +122,13 @@ def png(figure: Figure) -> bytes:
 
 
 def thin(times: np.ndarray, values: np.ndarray, longest: int = LONGEST) -> tuple[np.ndarray, np.ndarray]:
-    """At most `longest` of the finite samples, in order and with every visible peak.
+    """At most `longest` of the finite samples, in order and with every visible peak (`thinned`)."""
+    kept = thinned(values, longest)
+    return times[kept], values[kept]
+
+
+def thinned(values: np.ndarray, longest: int = LONGEST) -> np.ndarray:
+    """The places of at most `longest` finite `values`, in order.
 
     Of each stretch of equal sample count the smallest and the largest value stay, so that extremes survive.
     """
@@ -131,7 +137,7 @@ def thin(times: np.ndarray, values: np.ndarray, longest: int = LONGEST) -> tuple
         stretches = np.array_split(kept, longest // 2)
         ends = [(part[np.argmin(values[part])], part[np.argmax(values[part])]) for part in stretches]
         kept = np.unique(ends)
-    return times[kept], values[kept]
+    return kept
 
 
 def drawable(text: str, longest: int = 40) -> str:

@@ -107,14 +107,15 @@ def _render(
     return png(figure)
 
 
-def _models(overlay: Overlay, name: str, improved: bool) -> list[tuple[np.ndarray, str]]:
+def modelled(overlay: Overlay, name: str, improved: bool) -> list[tuple[np.ndarray, str]]:
+    """What each model shows of a channel (SI), and its colour."""
     before = [(overlay.baseline[name], BASELINE)]
     return [*before, (overlay.improved[name], IMPROVED)] if improved else before
 
 
 def _outputs(axes: Axes, overlay: Overlay, name: str, improved: bool) -> None:
-    axes.plot(*thin(overlay.times, overlay.measured[name]), ".", color=INK, markersize=1.6, alpha=0.45)
-    for values, color in _models(overlay, name, improved):
+    axes.plot(*thin(overlay.times, overlay.measured[name]), ".", color=INK, markersize=2.2, alpha=0.6)
+    for values, color in modelled(overlay, name, improved):
         axes.plot(*thin(overlay.times, values), color=color, linewidth=1.3)
     axes.set_xlim(overlay.times[0], overlay.times[-1])
     axes.locator_params(axis="y", nbins=5)
@@ -124,7 +125,7 @@ def _outputs(axes: Axes, overlay: Overlay, name: str, improved: bool) -> None:
 def _residuals(axes: Axes, overlay: Overlay, name: str, sigma: float, improved: bool) -> None:
     axes.axhspan(-2.0, 2.0, color=PALE, alpha=0.7, linewidth=0)
     axes.axhline(0.0, color=GREY, linewidth=0.7)
-    for values, color in _models(overlay, name, improved):
+    for values, color in modelled(overlay, name, improved):
         residual = (overlay.measured[name] - values) / sigma
         axes.plot(*thin(overlay.times, residual), ".", color=color, markersize=1.8, alpha=0.7)
     axes.locator_params(axis="y", nbins=3)
@@ -132,7 +133,7 @@ def _residuals(axes: Axes, overlay: Overlay, name: str, sigma: float, improved: 
 
 
 def _legend(improved: bool, model: str) -> list[Line2D]:
-    dots = Line2D([], [], color=INK, marker=".", linestyle="none", label="measured")
+    dots = Line2D([], [], color=INK, marker=".", markersize=7, linestyle="none", label="measured")
     handles = [dots, Line2D([], [], color=BASELINE, label=model)]
     if improved:
         handles.append(Line2D([], [], color=IMPROVED, label="improved model"))

@@ -9,12 +9,14 @@ from markupsafe import Markup
 
 from ..discrepancy.decisions import decision_rows
 from ..discrepancy.diagnosis import Conclusions
+from ..storage import installed_version
 from . import tables, text
 from .bars import top_candidates
 from .drawing import Picture, write_figures
 from .figures import draw
 from .forces import is_equation, telling_trace
 from .overlay import telling_overlay
+from .residual import located_device
 
 _VERDICTS = {
     "none": "no mismatch",
@@ -29,6 +31,14 @@ _KINDS = {
     "environment": "the surroundings",
     "disturbance": "random forces and noise alone",
 }
+
+_BY_EFFECTS = (
+    " Blue: the force of the effects added. Orange: the same by the recordings, which is what the baseline and the"
+    " force that it lacks make of them; the line is its median."
+)
+_BEYOND = " Orange: what the model lacks by the recordings; the line is its median."
+# as in CITATION.cff
+TITLE = "jaxsub: differentiable models of vehicles that move in water, and a diagnosis of the physics that they lack"
 
 
 def write_report(diagnosis: Conclusions, vehicle_text: str, folder: Path) -> None:
@@ -51,6 +61,11 @@ def render(diagnosis: Conclusions, vehicle_text: str, pictures: dict[str, Pictur
         "effects": _added(diagnosis, vehicle_text) if diagnosis.improves else "",
         "key_numbers": _key_numbers(diagnosis),
         "force_run": telling_trace(diagnosis),
+        "device": located_device(diagnosis),
+        "device_caption": _device_caption(diagnosis),
+        "by_state_words": _BY_EFFECTS if diagnosis.improves else _BEYOND,
+        "citation_title": TITLE,
+        "version": installed_version("jaxsub"),
         "overlay": telling_overlay(diagnosis),
         "candidates": top_candidates(diagnosis),
         "fit_columns": tables.fit_columns(diagnosis),
@@ -67,10 +82,20 @@ def _added(diagnosis: Conclusions, vehicle_text: str) -> str:
     return tables.effects_text(vehicle_text, {coefficient.name for coefficient in diagnosis.coefficients})
 
 
+def _device_caption(diagnosis: Conclusions) -> str:
+    device = located_device(diagnosis)
+    if device is None:
+        return ""
+    return (
+        f"Residual of {text.symbol(device.channel)} on a test run, where the mismatch of "
+        f"{text.place_name(device.place)} shows. Left: over time. Right: over the modelled value, where a wrong scale "
+        "is a slope and a bias a shift."
+    )
+
+
 def _key_numbers(diagnosis: Conclusions) -> list[tables.KeyNumber]:
-    mismatch = tables.KeyNumber(text.p_value(diagnosis.p_value), "p-value of the mismatch", "corrected for all tried")
-    numbers = [mismatch, tables.gain_number(diagnosis), tables.run_number(diagnosis)]
-    return [number for number in numbers if number is not None]
+    of = (tables.explained_number, tables.effect_number, tables.gain_number, tables.run_number)
+    return [number for number in (one(diagnosis) for one in of) if number is not None]
 
 
 def environment() -> jinja2.Environment:
@@ -89,7 +114,10 @@ def environment() -> jinja2.Environment:
         ratio=text.ratio,
         p_value=text.p_value,
         p_equals=text.p_equals,
-        symbol=text.symbol,
+        symbol=text.typeset,
+        label=text.typeset_label,
+        prose=text.prose,
+        place=text.place_name,
         unit=text.unit,
         formula=text.formula,
         intervals=tables.intervals,

@@ -5,13 +5,27 @@ import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 
+import numpy as np
 import tomlkit
 from markupsafe import Markup
 
 from ..discrepancy.diagnosis import ChannelQuality, Conclusions, Location, Regime, Remainder
 from ..discrepancy.settings import RESIDUAL_LEVEL
+from ..effects import FORCE_UNITS
 from ..findings import Finding
-from .text import UNKNOWN, formula, number, p_value, ratio, symbol, unit
+from .text import (
+    UNKNOWN,
+    formula,
+    measurement,
+    number,
+    p_value,
+    percent,
+    place_name,
+    ratio,
+    symbol,
+    typeset_label,
+    unit,
+)
 
 _MOST_INTERVALS = 6  # of one run; more are counted
 _SAME_SIGMA = 1.5  # factor by which stated and recorded noise may differ unremarked
@@ -113,10 +127,38 @@ def finding_rows(findings: Sequence[Finding]) -> list[Finding]:
     return sorted(findings, key=lambda finding: order.index(finding.severity))
 
 
+def explained_number(diagnosis: Conclusions) -> KeyNumber | None:
+    """How much of the test runs' error the improved model removes; None without one, or where there is no excess."""
+    share = diagnosis.explained.share if diagnosis.explained else None
+    if not diagnosis.improves or share is None:
+        return None
+    detail = "squared error above the sensors’ noise, all channels"
+    return KeyNumber(percent(share) if share > 0.0 else "nothing", "of the test error is removed", detail)
+
+
+def effect_number(diagnosis: Conclusions) -> KeyNumber | None:
+    """The first number of the effect accepted first, with its unit and the largest force that it makes."""
+    for found in diagnosis.physics:
+        for name, estimate in found.parameters.items():
+            value = f"{measurement(estimate.value, estimate.standard_error)} {unit(estimate.unit)}".rstrip()
+            acts = ", ".join(_peak(diagnosis, equation) for equation in found.equations)
+            return KeyNumber(value, Markup("{} of {}").format(formula(name), typeset_label(found.label)), acts)
+    return None
+
+
+def _peak(diagnosis: Conclusions, equation: str) -> str:
+    """The place an effect acts on, and the largest force of the added effects there."""
+    forces = [trace.modelled[equation] for trace in diagnosis.remaining_forces if equation in trace.modelled]
+    if not forces:
+        return place_name(equation)
+    size = max(float(np.nanmax(np.abs(force), initial=0.0)) for force in forces)
+    return f"up to {number(size, 2)} {FORCE_UNITS.get(equation, '')}".rstrip() + f" in {symbol(equation)}"
+
+
 def gain_number(diagnosis: Conclusions) -> KeyNumber | None:
     """The unseen channel that gained most, or without an improved model the one that is worst; None without any.
 
-    Over the noise that is stated for it, or in its unit where none is.
+    In its unit where that is known, and over the noise that is stated for it.
     """
     fit = diagnosis.fit.get("held_out", {})
     before, after = fit.get("baseline", {}), fit.get("improved", {}) if diagnosis.improves else {}
@@ -127,11 +169,11 @@ def gain_number(diagnosis: Conclusions) -> KeyNumber | None:
     chosen = max(both, key=gain) if both else max(before, key=lambda channel: before[channel])
     which = "most improved channel" if both else "worst channel"
     values = [models[chosen] for models in (before, after) if chosen in models]
-    quality = diagnosis.quality.get(chosen)
-    if quality is None or not quality.sigma_estimated:
-        value = " → ".join(ratio(value) for value in values)
-        return KeyNumber(value, f"residual/σ of {symbol(chosen)}, unseen runs", f"{which}; 1 is the noise floor")
-    return KeyNumber(_size(values, quality), f"rms error of {symbol(chosen)}, unseen runs", which)
+    quality, ratios = diagnosis.quality.get(chosen), " → ".join(ratio(value) for value in values)
+    if quality is None:
+        return KeyNumber(ratios, f"rms error/σ of {symbol(chosen)}, test runs", f"{which}; 1 is the noise floor")
+    floor = "" if quality.sigma_estimated else f"; {ratios} times its noise"
+    return KeyNumber(_size(values, quality, 2), f"rms error of {symbol(chosen)}, test runs", which + floor)
 
 
 def run_number(diagnosis: Conclusions) -> KeyNumber:
@@ -171,9 +213,9 @@ def effects_text(vehicle_text: str, fitted: Collection[str]) -> str:
     return tomlkit.dumps({name: part for name, part in parts.items() if part}).strip()
 
 
-def _size(values: Sequence[float], quality: ChannelQuality) -> str:
+def _size(values: Sequence[float], quality: ChannelQuality, digits: int = 3) -> str:
     """Multiples of a channel's σ in its unit, where it has one: `0.21 → 0.034 m/s`."""
-    return f"{' → '.join(number(value * quality.sigma, 3) for value in values)} {unit(quality.unit)}".rstrip()
+    return f"{' → '.join(number(value * quality.sigma, digits) for value in values)} {unit(quality.unit)}".rstrip()
 
 
 def _interval(start: float, end: float) -> str:

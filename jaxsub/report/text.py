@@ -10,7 +10,7 @@ from typing import Any
 from markupsafe import Markup, escape
 
 MINUS, TIMES, NARROW_SPACE = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{NARROW NO-BREAK SPACE}"
-UNKNOWN = "\N{EN DASH}"
+UNKNOWN, _DOT = "\N{EN DASH}", "\N{COMBINING DOT ABOVE}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _GREEK: dict[str, str] = {
     "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "phi": "φ", "theta": "θ", "psi": "ψ", "tau": "τ",
@@ -107,8 +107,46 @@ def file_stem(name: str) -> str:
 
 
 def symbol(name: str) -> str:
-    """`φ` for `phi`; other names as they are."""
-    return _GREEK.get(name, name)
+    """A name in plain letters as on the page: `φ` for `phi`, `δ_r` for `delta_r`, `φ̇` for `phi_rate`."""
+    stem, _, last = name.rpartition("_")
+    if last == "rate" and (stem in _GREEK or len(stem) == 1):
+        return symbol(stem) + _DOT
+    return "_".join(_GREEK.get(part, part) for part in name.split("_"))
+
+
+def typeset(name: str) -> Markup:
+    """The same as HTML, with subscripts: `δ<sub>r</sub>`; what is no identifier stays as it is."""
+    return _identifier(name) if name.isidentifier() else escape(symbol(name))
+
+
+def plain_label(label: str) -> str:
+    """The label of an effect in plain letters, with what it names in brackets as symbols: `sensor-bias[ψ]`."""
+    return "".join(symbol(piece) for piece in _label_pieces(label))
+
+
+def typeset_label(label: str) -> Markup:
+    """The same as HTML, with subscripts."""
+    return Markup("").join(typeset(piece) for piece in _label_pieces(label))
+
+
+def _label_pieces(label: str) -> list[str]:
+    """What stands before the brackets of a label, and the names and separators in them."""
+    stem, bracket, inside = label.partition("[")
+    return [stem, bracket, *re.split(r"([^\W\d]\w*)", inside)]
+
+
+def prose(text: str) -> Markup:
+    """A sentence with the Greek names of quantities in it as symbols: `φ is left at 2 σ`."""
+    names = rf"(?<![\w./\\-])((?:{'|'.join(_GREEK)})(?:_\w+)?)(?![\w./\\(-])"
+    pieces = re.split(names, text)
+    return Markup("").join(typeset(piece) if index % 2 else escape(piece) for index, piece in enumerate(pieces))
+
+
+def place_name(place: str) -> str:
+    """Where a mismatch lies in words: an equation, `actuator rudder` or `sensor ψ`."""
+    kind, colon, name = place.partition(":")
+    said = {"input": "actuator", "sensor": "sensor"}.get(kind) if colon else None
+    return f"{said} {symbol(name)}" if said else symbol(place)
 
 
 def unit(text: str) -> str:
@@ -133,11 +171,11 @@ def formula(text: str) -> Markup:
 
 
 def _identifier(name: str) -> Markup:
-    base, _, below = name.partition("_")
-    if not below:
+    if "_" not in symbol(name).strip("_"):
         return escape(symbol(name))
+    base, _, below = name.partition("_")
     below = "".join(symbol(part) for part in below.split("_"))
-    below = re.sub(r"(\w)dot$", "\\1\N{COMBINING DOT ABOVE}", below)
+    below = re.sub(r"(\w)dot$", rf"\1{_DOT}", below)
     return Markup("{}<sub>{}</sub>").format(symbol(base), below)
 
 

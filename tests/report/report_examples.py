@@ -68,7 +68,7 @@ def diagnosis(verdict: str = "named", seed: int = 7, samples: int = 1200, descri
         history=[(model, fit["held_out"][model]) for model in models],
         candidates=_candidates(verdict),
         forces=[trace(make, run, samples, float(missing)) for run in ("turns-1", "zigzag-2")],
-        remaining_forces=[trace(make, run, samples, 0.0) for run in ("turns-1", "zigzag-2")] if found else [],
+        remaining_forces=[trace(make, run, samples, 0.0, 1.0) for run in ("turns-1", "zigzag-2")] if found else [],
         overlays=[overlay(make, samples, missing, found)],
         coefficients=_coefficients(make, found),
         channels=[

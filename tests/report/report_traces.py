@@ -29,16 +29,22 @@ def _motion(times: np.ndarray, phase: float) -> np.ndarray:
     return turn * (1.0 + 0.2 * np.sin(times / 3.0))
 
 
-def trace(make: np.random.Generator, run: str, samples: int, size: float) -> ForceTrace:
+def trace(make: np.random.Generator, run: str, samples: int, size: float, modelled: float = 0.0) -> ForceTrace:
     times = np.linspace(0.0, 119.9, samples)
-    drag = size * np.where(run == "turns-1", 1.0, 0.6) * _motion(times, 0.3)
+    motion = np.where(run == "turns-1", 1.0, 0.6) * _motion(times, 0.3)
+    drag = size * motion
     kernel = np.ones(15) / 15
     force, band = {}, {}
     for index, (equation, scale) in enumerate(EQUATIONS.items()):
         noise = np.convolve(make.normal(size=samples), kernel, "same") * scale * 0.25
         force[equation] = noise + (scale * drag * (-1.0) ** index if equation in ("sway", "yaw") else 0.0)
         band[equation] = scale * 0.08 * (1.0 + 5.0 * np.exp(-times / 1.5) + 5.0 * np.exp((times - 119.9) / 1.5))
-    return ForceTrace(run, times, force, band)
+    effects = {e: -modelled * scale * motion / 1.2 for e, scale in EQUATIONS.items()} if modelled else {}
+    recorded = {e: one + 0.1 * EQUATIONS[e] * make.normal(size=samples) for e, one in effects.items()}
+    states = {"v": 0.25 * np.cbrt(motion), "r": 0.09 * motion, "delta_r": 0.3 * np.sin(times / 5.0)}
+    for values in (*effects.values(), *recorded.values(), *states.values()):
+        values[-1] = np.nan
+    return ForceTrace(run, times, force, band, recorded, effects, states)
 
 
 def overlay(make: np.random.Generator, samples: int, missing: bool, found: bool) -> Overlay:

@@ -25,9 +25,9 @@ from jaxsub.report.overlay import affected_channels
 
 FIGURES = {
     "none": {"forces", "scan", "before-after", "checks"},
-    "named": {"forces", "scan", "before-after", "checks", "coefficients"},
-    "ambiguous": {"forces", "scan", "before-after", "checks", "coefficients"},
-    "unknown": {"forces", "scan", "before-after", "checks"},
+    "named": {"forces", "by-state", "scan", "before-after", "checks", "coefficients"},
+    "ambiguous": {"forces", "by-state", "scan", "before-after", "checks", "coefficients"},
+    "unknown": {"forces", "by-state", "scan", "before-after", "checks"},
 }
 
 

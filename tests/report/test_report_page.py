@@ -1,15 +1,20 @@
 """The page stands alone, escapes what it quotes, shows what the diagnosis holds, and shrinks with the verdict."""
 
 import dataclasses
+import html
 import re
 from html.parser import HTMLParser
+from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 from report_examples import VEHICLE, bare, diagnosis
 from report_traces import CHANNELS, COEFFICIENTS
 
 from jaxsub.discrepancy.diagnosis import Rival
-from jaxsub.report.page import render
+from jaxsub.report import draw
+from jaxsub.report.page import TITLE, render
+from jaxsub.report.text import plain_label
 
 VERDICTS = ("none", "named", "ambiguous", "unknown")
 VOID = {"meta", "img", "source", "br", "link", "input"}
@@ -57,8 +62,14 @@ def test_everything_accepted_or_measured_appears(page):
     made = diagnosis("named")
     found = made.physics[0]
     wanted = [made.vehicle, made.summary, found.label, *(rival.label for rival in found.rivals), *made.notes]
-    wanted += [candidate.label for candidate in made.candidates] + [candidate.outcome for candidate in made.candidates]
-    wanted += [name for name, *_ in COEFFICIENTS] + [run.name for run in made.runs] + ["0.614 ± 0.021", "15.4 → 1.10"]
+    wanted += [plain_label(candidate.label) for candidate in made.candidates] + [
+        candidate.outcome for candidate in made.candidates
+    ]
+    wanted += (
+        [name for name, *_ in COEFFICIENTS]
+        + [run.name for run in made.runs]
+        + ["0.614 ± 0.021", "15.4 → 1.10", "0.15 → 0.011 m/s"]
+    )
     assert [thing for thing in wanted if thing not in text] == []
     rows = {"phi": "φ", "theta": "θ", "psi": "ψ"}
     assert all(f"<th>{rows.get(name, name)}</th>" in page("named") for name in CHANNELS)
@@ -78,7 +89,7 @@ def test_verdict_chooses_sections(page, verdict, badge, sections):
     text = page(verdict)
     outline = Outline(text)
     assert f'<span class="badge {verdict}">{badge}</span>' in text
-    assert set(outline.ids) == sections | {"coefficients", "data", "recordings", "notes"}
+    assert set(outline.ids) == sections | {"coefficients", "data", "recordings", "notes", "cite"}
     accepted = "term" in sections
     assert (">improved</th>" in text) == accepted
     assert ("[[effects]]" in outline.text) == accepted
@@ -100,14 +111,13 @@ def test_the_regime_and_what_an_effect_trades_with_are_said():
     """Claim: a mismatch has the regime it stands out in, and an effect the coefficient that it is correlated with."""
     text = Outline(render(diagnosis("named"), VEHICLE, {})).text.replace("\u202f", " ")
     assert "|r| ≥ 0.12 rad/s81 % of it, 6 % of the rest" in text
-    assert "correlated withY_v, correlation −0.97" in text
+    assert "correlated withYv, correlation −0.97" in text
 
 
 def test_the_kind_of_mismatch_is_said():
-    """Claim: every kind has its probability, and the file's numbers theirs; nothing is said where nothing was asked."""
+    """Claim: every kind has its probability; nothing is said where nothing was asked."""
     text = Outline(render(diagnosis("named"), VEHICLE, {})).text.replace("\u202f", " ")
     assert "the vehicle’s structure97 %" in text and "a sensor< 0.1 %" in text
-    assert "p = 3.2 × 10⁻⁹ where the file’s are right" in text
     assert "by what was accepted" in text
     assert "before anything is named" in render(diagnosis("unknown"), VEHICLE, {})
     assert "What kind" not in render(bare(), VEHICLE, {})
@@ -165,4 +175,41 @@ def test_quoted_text_is_escaped():
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_least_diagnosis_renders(verdict):
     outline = Outline(render(bare(verdict), "schema = 1\n", {}))
-    assert {"table", "img", "pre"}.isdisjoint(outline.tags)
+    assert {"table", "img"}.isdisjoint(outline.tags) and outline.tags.count("pre") == 1  # how to cite
+
+
+def test_the_first_numbers_are_the_error_removed_the_effect_and_the_channel_in_its_unit(page):
+    """Claim: the header has them in this order with their units, and no p-value."""
+    text = Outline(page("named")).text.replace("\u202f", " ")
+    header = text[: text.index("Where model and recordings differ")]
+    # a label comes before its value
+    wanted = ["of the test error is removed", "97 %", "Cd of crossflow-drag[horizontal]", "0.614 ± 0.021"]
+    places = [header.rindex(one) for one in (*wanted, "rms error of v, test runs", "0.15 → 0.011 m/s")]
+    assert places == sorted(places)
+    assert "up to 900 N in sway" in header and "10⁻" not in header and "p =" not in header
+
+
+def test_a_mismatch_in_a_sensor_shows_its_residual_first():
+    """Claim: with most of the mismatch in a sensor the first figure is its residual; forces come later."""
+    made = diagnosis("named")
+    assert "residual" not in draw(made)
+    sensor = dataclasses.replace(made, where=[dataclasses.replace(made.where[2], share=0.9), made.where[0]])
+    pictures = draw(sensor)
+    text = render(sensor, VEHICLE, pictures)
+    first, *_ = re.findall(r'<img alt="([^"]*)"', text)
+    assert first.startswith("Residual of psi")
+    assert text.index("The same mismatch as forces") > text.index("Residual of ψ on a test run")
+
+
+def test_one_quantity_has_one_symbol(page):
+    """Claim: outside of code the page has no Greek letter's name, and the drawn labels have none."""
+    text = re.sub(r"<style.*?</style>|<pre.*?</pre>|<code>.*?</code>|<[^>]*>", " ", page("named"), flags=re.DOTALL)
+    assert not re.search(r"\b(phi|theta|psi|delta)(_\w+)?\b", text)
+
+
+def test_the_page_is_cited_as_the_project_says():
+    """Claim: the title is that of CITATION.cff, with the version that made the page."""
+    citation = (Path(__file__).parents[2] / "CITATION.cff").read_text(encoding="utf-8")
+    assert f'title: "{TITLE}"' in citation
+    text = html.unescape(render(bare(), VEHICLE, {}))
+    assert TITLE in text and f"version = {{{version('jaxsub')}}}" in text

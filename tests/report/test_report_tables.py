@@ -32,8 +32,8 @@ def test_a_channel_without_a_stated_noise_is_told_in_its_unit_and_has_no_floor()
     alone = {"baseline": {"w": 7.0}, "improved": {"w": 0.5}}
     only = dataclasses.replace(made, fit={"train": alone, "held_out": alone})
     found = tables.gain_number(only)
-    assert found.value == f"{7.0 * sigma['w']:.3g} → {0.5 * sigma['w']:.3g} m/s"
-    assert "σ" not in found.label and "floor" not in found.detail
+    assert found.value == f"{7.0 * sigma['w']:.2g} → {0.5 * sigma['w']:.2g} m/s"
+    assert "σ" not in found.label and "noise" not in found.detail
 
 
 def test_channel_in_one_column_only_has_a_dash_in_the_others():
@@ -51,9 +51,15 @@ def test_noise_that_is_not_as_stated_is_flagged_both_ways():
 
 
 def test_key_numbers():
-    assert tables.gain_number(diagnosis("named")).value == "15.4 → 1.10"
-    assert tables.gain_number(diagnosis("unknown")).value == "15.4"
-    assert tables.gain_number(diagnosis("unknown", described=True)).value == "15.4 → 1.10"
+    assert tables.gain_number(diagnosis("named")).value == "0.15 → 0.011 m/s"
+    assert tables.gain_number(diagnosis("named")).detail == "most improved channel; 15.4 → 1.10 times its noise"
+    assert tables.gain_number(diagnosis("unknown")).value == "0.15 m/s"
+    assert tables.gain_number(diagnosis("unknown", described=True)).value == "0.15 → 0.011 m/s"
+    unquoted = dataclasses.replace(diagnosis("named"), channels=[])
+    assert tables.gain_number(unquoted).value == "15.4 → 1.10"
+    assert tables.explained_number(diagnosis("named")).value.startswith("97")
+    assert tables.explained_number(diagnosis("unknown")) is None
+    assert tables.effect_number(diagnosis("unknown")) is None
     assert tables.gain_number(bare()) is None
     assert tables.run_number(diagnosis("none")).detail.startswith("2 for training, 1 for the test")
 

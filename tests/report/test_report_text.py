@@ -7,7 +7,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jaxsub.report.text import formula, measurement, number, p_equals, p_value, percent, ratio, symbol, unit
+from jaxsub.report.text import (
+    formula,
+    measurement,
+    number,
+    p_equals,
+    p_value,
+    percent,
+    plain_label,
+    prose,
+    ratio,
+    symbol,
+    typeset_label,
+    unit,
+)
 
 quick = settings(derandomize=True, deadline=None, max_examples=300)
 sizes = st.builds(
@@ -98,7 +111,13 @@ def test_ratio_has_three_digits():
 
 
 def test_symbols_units_and_formulas_are_set():
-    assert [symbol(name) for name in ("phi", "psi", "u", "phi_2")] == ["φ", "ψ", "u", "phi_2"]
+    assert [symbol(name) for name in ("phi", "psi", "u", "phi_2", "delta_r")] == ["φ", "ψ", "u", "φ_2", "δ_r"]
+    assert [symbol(name) for name in ("phi_rate", "depth_rate")] == ["φ\N{COMBINING DOT ABOVE}", "depth_rate"]
+    assert plain_label("sensor-bias[psi,delta_r]") == "sensor-bias[ψ,δ_r]"
+    assert typeset_label("lag[delta_r]<") == "lag[δ<sub>r</sub>]&lt;"
+    assert prose("psi is left at 2 σ; see logs/psi.csv and delta_r") == (
+        "ψ is left at 2 σ; see logs/psi.csv and δ<sub>r</sub>"
+    )
     assert [unit(text) for text in ("1", "N*m/(rad/s)/(rad/s)", "m/s/s", "m s^-2")] == [
         "",
         "N m/(rad/s)²",
