@@ -17,9 +17,10 @@ from ..errors import InputError
 from ..estimate import require_free
 from ..plain import to_json
 from ..recording import Recording, hold_out, save
+from ..recording.recording import Recordings
 from ..report.text import measurement, percent, ratio, unit
 from ..vehicle import AbstractVehicle, vehicle_text, with_coefficients
-from .recordings import Recordings, checked
+from .recordings import checked
 from .result import AbstractResult
 from .table import Parts, Table
 

@@ -37,11 +37,12 @@ from ..information import (
 from ..information import identifiability as determined
 from ..plain import to_json
 from ..recording import Recording
+from ..recording.recording import Recordings
 from ..recording.runs import Runs
 from ..report.text import unit
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle, write_vehicle
-from .recordings import Recordings, checked
+from .recordings import checked
 from .result import AbstractResult
 from .table import Parts, Table
 

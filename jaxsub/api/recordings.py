@@ -1,19 +1,9 @@
 """Recordings as the functions of the front door take them: one or several, checked as commands check them."""
 
-from collections.abc import Sequence
-
 from ..checks import Checked, check
 from ..findings import require_none
-from ..recording import Recording
+from ..recording.recording import Recordings, listed
 from ..vehicle import AbstractVehicle, check_units
-
-# what a function of the front door takes
-Recordings = Recording | Sequence[Recording]
-
-
-def listed(recordings: Recordings) -> list[Recording]:
-    """The recordings, one of them too, as a list."""
-    return [recordings] if isinstance(recordings, Recording) else list(recordings)
 
 
 def checked(vehicle: AbstractVehicle, recordings: Recordings, held_out: Recordings = ()) -> Checked:

@@ -12,12 +12,13 @@ from ..estimate import Assessment, assess_residuals, batch, channel_rms
 from ..findings import Finding
 from ..likelihood import residual_outputs
 from ..recording import Recording, save, to_pandas, to_xarray
+from ..recording.recording import Recordings, listed
 from ..recording.runs import Runs
 from ..report.text import unit
 from ..simulation import simulate as sampled
 from ..vehicle import AbstractVehicle, recorded_columns
 from .initial_states import Start, initial_state, with_every_channel
-from .recordings import Recordings, checked, listed
+from .recordings import checked
 from .result import AbstractResult
 from .table import Parts, Table
 

@@ -13,9 +13,10 @@ from ..estimate import batch, initial_guess, search
 from ..filter import AbstractFilter, Estimate, ExtendedKalmanFilter, VehicleProcess, over_runs, samples, vehicle_filter
 from ..programs import compiled
 from ..recording import Recording, save, to_pandas, to_xarray
+from ..recording.recording import Recordings
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
-from .recordings import Recordings, checked
+from .recordings import checked
 from .result import AbstractResult
 from .table import Parts, Table
 

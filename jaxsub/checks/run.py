@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import InputError
 from ..findings import Finding
 from ..recording import Recording
+from ..recording.recording import Recordings, listed
 from ..vehicle import AbstractVehicle, Layout, vehicle_findings
 from .channels import Channel, channels_of
 from .consistency import consistency
@@ -23,9 +24,9 @@ from .spikes import spikes
 from .turning import turning
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Checked:
-    """What checks found in runs, and the runs as they will be used.
+    """What checks found in runs, and the runs as they will be used. It prints a line for each finding.
 
     **Fields**
 
@@ -37,18 +38,23 @@ class Checked:
     recordings: tuple[Recording, ...]
     held_out: tuple[Recording, ...] = ()
 
+    def __repr__(self) -> str:
+        lines = [f"{finding.severity}: {finding.line()}" for finding in self.findings]
+        return "\n".join(lines) or f"Nothing was found in {len(self.recordings) + len(self.held_out)} recordings."
+
     @property
     def errors(self) -> tuple[Finding, ...]:
         """The findings that stop a command."""
         return tuple(finding for finding in self.findings if finding.severity == "error")
 
 
-def check(vehicle: AbstractVehicle, recordings: Sequence[Recording], held_out: Sequence[Recording] = ()) -> Checked:
-    """Look at runs before any fit: faults of clocks and sensors, and what contradicts itself or the vehicle.
+def check(vehicle: AbstractVehicle, recordings: Recordings, held_out: Recordings = ()) -> Checked:
+    """Look at one run or several before any fit: faults of clocks and sensors, contradictions among them, the vehicle.
 
     Nothing is raised for what is wrong: it is in the findings. Samples that cannot be are masked, angles unwrapped, and
     a run is cut where time has a hole while an input moved; each of these is a finding too.
     """
+    recordings, held_out = listed(recordings), listed(held_out)
     layout = vehicle.layout
     speed = float(vehicle.own_values().get("speed", 0.0))
     every = [*recordings, *held_out]

@@ -62,7 +62,7 @@ class CoefficientVerdict:
         return f"{self.name}: {self.kind}{with_}, {known}; {self.remedy}."
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Identifiability:
     """Rank of the scaled Jacobian at the level of the noise, its null directions, and a verdict on each coefficient.
 
@@ -80,6 +80,9 @@ class Identifiability:
     uncertainty: list[float]
     verdicts: tuple[CoefficientVerdict, ...] = ()
     families: tuple[Family, ...] = ()
+
+    def __repr__(self) -> str:
+        return "\n".join(self.sentences())
 
     def sentences(self) -> list[str]:
         """The verdict in words, a line each: rank, open directions, then the coefficients that are not identified."""

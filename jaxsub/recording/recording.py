@@ -194,3 +194,12 @@ def _read_only(values: np.ndarray) -> np.ndarray:
     copy = np.array(values, np.float64)
     copy.setflags(write=False)
     return copy
+
+
+# what functions take that work on one run or on several
+Recordings = Recording | Sequence[Recording]
+
+
+def listed(recordings: Recordings) -> list[Recording]:
+    """The recordings, one of them too, as a list."""
+    return [recordings] if isinstance(recordings, Recording) else list(recordings)

@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 from pathlib import Path
-from typing import NamedTuple
 
 import jinja2
 import markdown2
@@ -12,8 +11,9 @@ import nbconvert
 
 from jaxsub.effects import VOCABULARY
 
-from . import mathematics
+from . import mathematics, search
 from .reference import Reference
+from .search import Page
 
 HERE = Path(__file__).resolve().parent
 NOTEBOOKS = HERE.parent
@@ -35,16 +35,10 @@ GUIDES = (
     "posterior",
     "add-an-effect",
     "add-an-estimator",
+    "coming-from",
+    "glossary",
 )
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)#\s]+)")
-
-
-class Page(NamedTuple):
-    """A page by its address, its title and its text as HTML."""
-
-    address: str
-    title: str
-    text: str
 
 
 def write_pages(out: Path, reference: Reference) -> list[str]:
@@ -77,6 +71,7 @@ def write_pages(out: Path, reference: Reference) -> list[str]:
     for page in everything:
         made = template.render(page=page, menu=menu, style=style, rooms=_rooms(reference))
         (out / page.address).write_text(made, encoding="utf-8")
+    (out / "search.js").write_text(search.script(everything, reference.addresses), encoding="utf-8")
     return found + missing
 
 

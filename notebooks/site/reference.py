@@ -38,13 +38,17 @@ class Reference(NamedTuple):
     @classmethod
     def of(cls, package: str) -> "Reference":
         """Of a package as it is installed here."""
+        path = importlib.import_module(package).__path__
         # imported before pdoc does, which forbids modules to ask the machine what it is
-        for found in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
+        for found in pkgutil.walk_packages(path, f"{package}."):
             module = importlib.import_module(found.name)
             # pdoc lists what is in a module already, and a package may import its names when they are asked for
             for name in getattr(module, "__all__", ()):
                 getattr(module, name)
-        modules = {name: pdoc.doc.Module.from_name(name) for name in pdoc.extract.walk_specs([package, *_BESIDE])}
+        # the package lists names in `__all__`, of which pdoc takes it that nothing else is public
+        rooms = [found.name for found in pkgutil.iter_modules(path, f"{package}.") if "._" not in found.name]
+        listed = pdoc.extract.walk_specs([package, *rooms, *_BESIDE])
+        modules = {name: pdoc.doc.Module.from_name(name) for name in listed}
         addresses = {}
         for name, module in modules.items():
             page = f"api/{name.replace('.', '/')}.html"
@@ -80,7 +84,14 @@ class Reference(NamedTuple):
     def names(self, text: str) -> Iterator[tuple[str, str]]:
         """Every `jaxsub.name` in a text, and what is wrong with it, if anything."""
         for name in _NAME.findall(text):
-            yield name, "" if name in self.addresses or _exists(name) else f"`{name}` is nothing"
+            yield name, "" if name in self.addresses else self._fault(name)
+
+    def _fault(self, name: str) -> str:
+        """What is wrong with a name that has no address."""
+        if not _exists(name):
+            return f"`{name}` is nothing"
+        room = ".".join(name.split(".")[:2])
+        return "" if room in self.modules else f"`{room}` has no page"
 
     def linked(self, markdown: str, up: str) -> str:
         """Markdown whose `jaxsub.name`s are links to where they are described; `up` leads to the site's root."""

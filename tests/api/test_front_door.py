@@ -86,6 +86,16 @@ def test_fit_shows_itself(found):
     assert found.identifiability.rank == js.identifiability(found.vehicle, found.recordings).rank == 3
 
 
+def test_what_runs_identify_and_faults_of_runs_are_printed_in_sentences(rig, found):
+    """Claim: both print lines that a reader understands, and a check takes one recording as well as several."""
+    vehicle, run = rig
+    assert repr(found.identifiability).startswith("The recordings determine 3 of 3 directions")
+    assert repr(js.check(vehicle, run)) == repr(js.check(vehicle, [run])) == "Nothing was found in 1 recordings."
+    columns = run.columns | {"x": np.where(np.arange(len(run.times)) == 7, 1e3, run.columns["x"])}
+    (line,) = repr(js.check(vehicle, js.Recording("run", run.times, columns, "spiked"))).splitlines()
+    assert line.startswith("warning: ") and "column 'x'" in line
+
+
 def test_saved_results_replace_only_what_jaxsub_wrote(found, tmp_path):
     """Claim: an existing folder is refused, with `overwrite` replaced, and refused where a file of it was changed."""
     found.save(tmp_path / "out")

@@ -1,6 +1,10 @@
 """The site's build finds what would be wrong with it: dead links, names that are none, formulas that were not set."""
 
+import re
+import shutil
+import subprocess
 import types
+from urllib.parse import quote
 
 import pytest
 
@@ -9,7 +13,7 @@ pytest.importorskip("markdown2")
 pytest.importorskip("nbconvert")
 pytest.importorskip("latex2mathml")
 
-from notebooks.site import check, mathematics, pages
+from notebooks.site import check, mathematics, pages, search
 from notebooks.site.reference import Reference
 
 
@@ -25,6 +29,41 @@ def test_faults_of_pages_are_found(tmp_path):
         assert any(words in line for line in found), words
 
 
+PAGES = [
+    search.Page(
+        "fins.html", "Fins", '<h1 id="fins">Fins</h1><p>All.</p><h2 id="play">Play &amp; wear</h2><p>backlash</p>'
+    ),
+    search.Page("filters.html", "Filters", '<h1 id="filters">Filters</h1><p>An <b>innovation</b> of a fin.</p>'),
+]
+
+
+def test_sections_are_found_by_heading_and_text():
+    listed = [section for page in PAGES for section in search.sections(page)]
+    assert listed == [
+        ("fins.html#fins", "Fins", "All."),
+        ("fins.html#play", "Fins: Play & wear", "backlash"),
+        ("filters.html#filters", "Filters", "An innovation of a fin."),
+    ]
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium")
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [("fin", ["fins.html#fins", "fins.html#play", "filters.html#filters"]), ("wear BACKLASH", ["fins.html#play"]),
+     ("fuzzynoise", ["api/f.html#FuzzyNoise"]), ("nothing", [])],
+)  # fmt: skip
+def test_a_browser_lists_what_has_every_word_titles_first(tmp_path, words, expected):
+    """Claim: without a server, from a file; names of the reference too."""
+    (tmp_path / "search.js").write_text(search.script(PAGES, {"jaxsub.f.FuzzyNoise": "api/f.html#FuzzyNoise"}))
+    page = '<input id="search"><ul id="found" hidden></ul><script src="search.js"></script>'
+    (tmp_path / "index.html").write_text(page)
+    address = f"file://{tmp_path}/index.html?q={quote(words)}"
+    command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", address]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert re.findall(r'<li><a href="([^"]+)"', shown) == expected
+    assert ("Nothing was found." in shown.partition("<script")[0]) is not bool(expected)
+
+
 def test_formulas_become_mathml_and_code_is_left():
     page = mathematics.in_html("<p>with $a_1 &lt; b_2$ and $$\\frac{1}{2}$$</p><pre>$a$</pre><code>$b$</code>")
     assert page.count("<math") == 2 and "<mfrac>" in page and "<pre>$a$</pre><code>$b$</code>" in page
@@ -33,10 +72,14 @@ def test_formulas_become_mathml_and_code_is_left():
 
 
 def test_names_are_linked_where_they_are_described_and_faults_where_they_are_nothing():
-    reference = Reference({}, {"jaxsub.units.to_si": "api/jaxsub/units.html#to_si"})
-    text = "`jaxsub.units.to_si` beside `jaxsub.units.TIME` and `jaxsub.units.nothing`"
+    import pdoc.doc
+
+    addresses = {"jaxsub.units.to_si": "api/jaxsub/units.html#to_si"}
+    reference = Reference({"jaxsub.units": pdoc.doc.Module.from_name("jaxsub.units")}, addresses)
+    text = "`jaxsub.units.to_si` beside `jaxsub.units.TIME`, `jaxsub.units.nothing` and `jaxsub.errors.InputError`"
     assert reference.linked(text, "").startswith("[`jaxsub.units.to_si`](api/jaxsub/units.html#to_si)")
-    assert [fault for _, fault in reference.names(text)] == ["", "", "`jaxsub.units.nothing` is nothing"]
+    faults = ["`jaxsub.units.nothing` is nothing", "`jaxsub.errors` has no page"]
+    assert [fault for _, fault in reference.names(text)] == ["", "", *faults]
 
 
 def test_missing_docstrings_are_faults():
