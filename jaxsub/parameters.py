@@ -40,6 +40,8 @@ class Parameter:
     - `lower`, `upper`: bounds in SI, infinite where there are none.
     - `prior_std`: standard deviation of a Gaussian prior about `prior_mean`, infinite where there is none.
     - `prior_mean`: the value that the vehicle file gives.
+    - `varies`: whether it differs by run about a common mean, which bounds and prior are then for.
+    - `spread`: standard deviation between runs as the file gives it, 0 where it is to be estimated.
     """
 
     name: str
@@ -49,6 +51,8 @@ class Parameter:
     upper: float = math.inf
     prior_std: float = math.inf
     prior_mean: float = 0.0
+    varies: bool = False
+    spread: float = 0.0
 
 
 class Transform(eqx.Module):

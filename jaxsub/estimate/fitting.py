@@ -19,6 +19,7 @@ from ..recording.runs import Runs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .batches import batch
+from .between_runs import RunVariation, estimate_spreads, run_variations, unknown_spreads, wide_spreads, with_spreads
 from .blockwise import Descent, raced
 from .curvature import decoupled
 from .method import AbstractMethod, Passes, unwatched
@@ -26,6 +27,8 @@ from .methods import filtered_first, gauss_newton
 from .problem import Problem
 
 _CONCENTRATIONS = 12
+# of a standard deviation, a change that ends its estimation
+_SETTLED = 0.003
 # standard errors from an optimum that is none
 _MATTERS = 0.1
 
@@ -37,7 +40,8 @@ class AbstractSearchEnd(eqx.Module):
 
     - `vehicle`: with the numbers found. `start`: (R, s) initial states. `sigma`: (c,) noise, SI.
     - `cost`: ½ Σ whitened residuals², priors included. `steps`: evaluations by the search. `result`: a `RESULTS` value.
-    - `known_start`: whether `start` was given.
+    - `known_start`: whether `start` was given. `estimated_spreads`: the numbers that differ by run whose standard
+      deviation between runs was estimated.
     """
 
     vehicle: eqx.AbstractVar[AbstractVehicle]
@@ -48,6 +52,7 @@ class AbstractSearchEnd(eqx.Module):
     steps: eqx.AbstractVar[Array]
     result: eqx.AbstractVar[RESULTS]
     known_start: eqx.AbstractVar[bool]
+    estimated_spreads: eqx.AbstractVar[tuple[str, ...]]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -85,6 +90,7 @@ class SearchEnd(AbstractSearchEnd):
     steps: Array
     result: RESULTS
     known_start: bool = eqx.field(static=True, default=False, kw_only=True)
+    estimated_spreads: tuple[str, ...] = eqx.field(static=True, default=(), kw_only=True)
 
 
 @final
@@ -112,6 +118,7 @@ class Solution(AbstractSearchEnd):
     gradient_norm: Float[Array, ""]
     pressed: Float[Array, " p"]
     known_start: bool = eqx.field(static=True, default=False, kw_only=True)
+    estimated_spreads: tuple[str, ...] = eqx.field(static=True, default=(), kw_only=True)
 
     @property
     def at_bound(self) -> dict[str, str]:
@@ -123,6 +130,12 @@ class Solution(AbstractSearchEnd):
     def standard_errors(self) -> dict[str, float]:
         """Their standard errors."""
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
+
+    @property
+    def variations(self) -> tuple[RunVariation, ...]:
+        """The numbers that differ by run: mean, standard deviation between runs, and each run's own value."""
+        products = self.model.products
+        return run_variations(self.problem, products, self.start, self.covariance, self.estimated_spreads)
 
     @property
     @quietly
@@ -160,7 +173,10 @@ def search(
     `method` is Gauss–Newton where none is given. `known_start` takes the initial states `start` for the truth. `moving`
     false keeps the vehicle and finds the initial states alone, as for a run that the fit did not see.
     Noise comes from `sigma`, else from the vehicle file; channels whose noise is to be estimated have it concentrated
-    out: fit, take the rms, fit again from there, until it settles. `passes` is told as by `AbstractMethod.run`.
+    out: fit, take the rms, fit again from there, until it settles. So have numbers that differ by run their standard
+    deviation between runs, where the vehicle knows none and may move. `passes` is told as by `AbstractMethod.run`.
+
+    **Raises** `InputError` where that is to be estimated from one run.
     """
     given = [output.sigma for output in vehicle.layout.outputs]
     estimated = np.array([s is None and sigma is None for s in given], bool)
@@ -168,6 +184,8 @@ def search(
     if estimated.any():
         noise = np.where(estimated, np.asarray(_signal(runs)), noise)
     noise = jax.device_put(noise)
+    varied = unknown_spreads(vehicle, len(runs.times)) if moving and not known_start else ()
+    vehicle = vehicle.with_spreads(wide_spreads(vehicle, varied)) if varied else vehicle
     problem = Problem.of(vehicle, runs, noise, start, moving=moving, known_start=known_start)
     y, total = problem.coordinates(), 0
     for _ in range(_CONCENTRATIONS):
@@ -175,15 +193,29 @@ def search(
         y, cost, result = found.y, found.cost, found.result
         total += int(found.evaluations)
         fitted, states = problem.split(y)
-        if not estimated.any() or not np.isfinite(cost):
+        if not (estimated.any() or varied) or not np.isfinite(cost):
             break
-        rms = concentrated_sigma(output_errors(fitted, runs, states), runs)
-        settled = bool(jnp.all(jnp.abs(rms / problem.sigma - 1.0) < 0.003, where=estimated))
-        # a channel without errors, such as one that was never measured, says nothing of its noise
-        problem = dataclasses.replace(problem, sigma=jnp.where(estimated & (rms > 0.0), rms, problem.sigma))
+        settled = True
+        if estimated.any():
+            rms = concentrated_sigma(output_errors(fitted, runs, states), runs)
+            settled = bool(jnp.all(jnp.abs(rms / problem.sigma - 1.0) < _SETTLED, where=estimated))
+            # a channel without errors, such as one that was never measured, says nothing of its noise
+            problem = dataclasses.replace(problem, sigma=jnp.where(estimated & (rms > 0.0), rms, problem.sigma))
+        if varied:
+            spreads = estimate_spreads(problem, y, varied)
+            now = {name: float(problem.vehicle.spreads[name]) for name in varied}
+            same = all(abs(spreads[name] - now[name]) <= _SETTLED * spreads[name] for name in varied)
+            if not (settled and same):
+                # coordinates are in units of the standard deviation, and the values stay
+                problem = with_spreads(problem, spreads)
+                y = problem.coordinates_of(fitted, states)
+            settled = settled and same
         if settled:
             break
-    return SearchEnd(fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=known_start)
+    return SearchEnd(
+        fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=known_start,
+        estimated_spreads=varied,
+    )  # fmt: skip
 
 
 def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " c"]) -> SearchEnd:

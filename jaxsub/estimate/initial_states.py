@@ -19,6 +19,8 @@ _MEMORY = 0.1
 def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r s"], Float[Array, " s"]]:
     """Initial states from the first sample of each state's channel, else at rest; and their standard deviations.
 
+    A run's deviation of a number that differs by run has that between runs, and none while it is not known.
+
     A sensor that starts late measures a state that may have changed since the run began: the standard deviation is then
     at least the rms change of its channel over so long a time.
     """
@@ -27,7 +29,11 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
     mask, outputs, times = np.asarray(runs.mask), _as_states(vehicle, runs), np.asarray(runs.times)
     guess = np.tile(_resting(vehicle), (len(times), 1))
     spread = np.ones(len(layout.states))
+    deviations = layout.deviations
     for i, name in enumerate(layout.states):
+        if name in deviations:
+            spread[i] = np.nan_to_num(np.asarray(vehicle.spreads[deviations[name].name]))
+            continue
         spread[i] = _MEMORY if name in kept else _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
         if name not in measured:
             if (coordinate := name.removesuffix("_rate")) in layout.channels:

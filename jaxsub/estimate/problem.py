@@ -130,6 +130,15 @@ class Problem(eqx.Module):
         """The coordinates of the start."""
         return jnp.pad(self.origin, (0, 0 if self.known_start else self.guess.size))
 
+    def coordinates_of(self, vehicle: AbstractVehicle, start: Float[Array, "r s"]) -> Float[Array, " d"]:
+        """The coordinates of the numbers of `vehicle` and the initial states `start`; known ones have none."""
+        values = vehicle.values()
+        theta = jnp.array([values[row.name] for row in self.vehicle.layout.free])
+        if self.known_start:
+            return self.at(theta)
+        moved = (start - self.guess) / jnp.where(self.spread > 0.0, self.spread, 1.0)
+        return self.at(theta).at[len(theta) :].set(jnp.where(self.spread > 0.0, moved, 0.0).ravel())
+
     def at(self, theta: Float[Array, " p"]) -> Float[Array, " d"]:
         """The coordinates of the physical parameters `theta` and the guessed initial states."""
         return self.coordinates().at[: len(theta)].set(self.transform.to_free(theta))

@@ -77,7 +77,7 @@ def _with_gain(vehicle: SubmergedBody, effect: ActuatorGain) -> SubmergedBody:
     item = next((item for item in items if item.name == effect.actuator), None)
     # what a propeller loses, a rudder in its race loses too
     raced = any(isinstance(one, Rudder) and one.propeller == effect.actuator for one in items)
-    if item is None or not item.factor or raced or f"{item.name}.{item.factor}" in tied:
+    if item is None or not item.factor or raced or f"{item.name}.{item.factor}" in {*tied, *vehicle.spreads}:
         return vehicle
     ((field, old),) = parameter_table(effect).items()
     row = next(row for row in vehicle.layout.parameters if row.name == old.name)

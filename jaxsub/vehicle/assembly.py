@@ -16,10 +16,12 @@ from .checks import (
     check_effects,
     check_inputs,
     check_names,
+    check_variation,
     require_inertia,
 )
 from .damping import Damping
 from .inertia import CENTRE_OF_GRAVITY, RIGID, Inertia
+from .layout import deviation
 from .mechanism import Mechanism
 from .products import Products
 from .restoring import STANDARD_DENSITY, Restoring
@@ -93,7 +95,7 @@ def build(
     equations = dof or EQUATIONS
     shown = tuple(output.state for output in outputs)
     positions = _positions(equations, dict(prescribed), shown) if kind == "submerged-body" else equations
-    positions += memory_states(effects)
+    positions += (*memory_states(effects), *(deviation(row.name) for row in rows if row.varies))
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
     layout = Layout(
         name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes, system=system,
@@ -107,10 +109,12 @@ def build(
         body = _body(values, layout, effects, devices, density, where)
         vehicle = dataclasses.replace(body, coriolis=coriolis)
     sensors = Sensors({key: number(value) for key, (value, _) in of_sensors.items()}, density)
-    vehicle = dataclasses.replace(vehicle, sensors=sensors)
+    spreads = {row.name: number(row.spread or math.nan) for row in rows if row.varies}
+    vehicle = dataclasses.replace(vehicle, sensors=sensors, spreads=spreads)
     if ties:
         vehicle = vehicle.with_values({})  # the numbers of effects and sensors that follow others
     check_effects(vehicle, where)
+    check_variation(vehicle, where)
     require_inertia(vehicle, where)
     return vehicle
 

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from ..arrays import Values
 from ..effects import (
+    AbstractActuation,
     AbstractActuator,
     AbstractEffect,
     AbstractForce,
@@ -22,10 +23,12 @@ from ..effects import (
     with_numbers,
 )
 from ..methods import jittable
+from ..parameters import number
 from .description import described
-from .layout import Layout
+from .layout import Layout, deviation
 from .sensors.output import SPECIFIC_FORCE
 from .sensors.sensors import Sensors
+from .variation import sample_by_sample
 
 
 class AbstractVehicle(eqx.Module):
@@ -34,11 +37,16 @@ class AbstractVehicle(eqx.Module):
     $\tau$ is all that is not linear damping. A state is [ν of the free equations, positions], the states of effects
     with a memory last among the positions; signals are the columns of inputs, prescribed motions and surroundings in
     that order, and may end with the time (s), which is otherwise 0. All methods take any leading axes.
+
+    Of a number that differs by run the vehicle has the mean, and among its positions each run's deviation from that,
+    which stands still. `spreads` are the standard deviations between runs of such numbers by name, SI; NaN where that
+    is still to be estimated.
     """
 
     layout: eqx.AbstractVar[Layout]
     effects: eqx.AbstractVar[tuple[AbstractEffect, ...]]
     sensors: eqx.AbstractVar[Sensors]
+    spreads: eqx.AbstractVar[dict[str, Array]]
 
     def __repr__(self) -> str:
         return described(self.layout, self.values())
@@ -76,6 +84,16 @@ class AbstractVehicle(eqx.Module):
     @abc.abstractmethod
     def fixed_gains(self) -> tuple[str, ...]:
         """The actuators whose force no free number of its own scales as a whole (`Facts.fixed_gains`)."""
+
+    @property
+    @abc.abstractmethod
+    def actuation(self) -> AbstractActuation:
+        """The forces of its own actuators, each by itself."""
+
+    @property
+    @abc.abstractmethod
+    def linear(self) -> frozenset[str]:
+        """The numbers that inertia and linear damping follow."""
 
     @property
     def aliases(self) -> dict[str, str]:
@@ -127,13 +145,33 @@ class AbstractVehicle(eqx.Module):
         """The same vehicle less the effect of that label."""
         gone = {row.name for e in self.effects if e.label == label for row in parameter_table(e).values()}
         kept = tuple(e for e in self.effects if e.label != label)
-        lost = memory_states(tuple(e for e in self.effects if e.label == label))
+        lost = {*memory_states(tuple(e for e in self.effects if e.label == label)), *map(deviation, gone)}
         layout = dataclasses.replace(
             self.layout,
             parameters=tuple(p for p in self.layout.parameters if p.name not in gone),
             positions=tuple(name for name in self.layout.positions if name not in lost),
         )
-        return dataclasses.replace(self, effects=kept, layout=layout)
+        spreads = {name: spread for name, spread in self.spreads.items() if name not in gone}
+        return dataclasses.replace(self, effects=kept, layout=layout, spreads=spreads)
+
+    def with_spreads(self, spreads: Mapping[str, Values]) -> Self:
+        """The same vehicle with other standard deviations between runs of the numbers named, SI."""
+        return dataclasses.replace(self, spreads={n: number(spreads.get(n, old)) for n, old in self.spreads.items()})
+
+    def of_run(self, positions: Mapping[str, Signal]) -> Self:
+        """The vehicle with the numbers of the run in which `positions` are; itself where none differs by run."""
+        if not self.spreads:
+            return self
+        values = self.values()
+        own = {name: values[name] + positions[deviation(name)] for name in self.spreads}
+        return dataclasses.replace(self.with_values(own), spreads={})
+
+    @property
+    def at_mean(self) -> Self:
+        """The vehicle with the mean of numbers that differ by run for every run, and without the runs' deviations."""
+        if not self.spreads:
+            return self
+        return dataclasses.replace(self, spreads={}, layout=self.layout.at_mean)
 
     def holding(self, names: Collection[str]) -> Self:
         """The same vehicle, the numbers of those `names` no longer free."""
@@ -147,11 +185,31 @@ class AbstractVehicle(eqx.Module):
         for effect in self.effects:
             if isinstance(effect, AbstractMemory):
                 rates = rates | effect.memory_rates(motion)
-        return rates
+        still = jnp.zeros_like(motion.rates[self.layout.equations[0]])
+        return rates | {deviation(name): still for name in self.spreads}
 
     @jittable
     def force(self, motion: Motion) -> Float[Array, "*k n"]:
-        """All generalised forces (N, N m) other than linear damping, effects included."""
+        r"""All generalised forces (N, N m) other than linear damping, effects included.
+
+        Of a run whose inertia $\tilde M_r$ or damping $\tilde A_r$ is its own
+        $\tilde M\tilde M_r^{-1}(\tau_r + \tilde A_r\nu) - \tilde A\nu$, so that $\dot\nu$ is the run's.
+        """
+        if self.spreads:
+            return sample_by_sample(self._force_of_run, motion, motion.rates[self.layout.equations[0]].shape)
+        return self._force(motion)
+
+    def _force_of_run(self, motion: Motion) -> Float[Array, " n"]:
+        run, equations = self.of_run(motion.positions), self.layout.equations
+        force = run._force(dataclasses.replace(motion, actuation=run.actuation))
+        changed = {*self.spreads, *(tie.name for tie in self.layout.ties if {*tie.names} & {*self.spreads})}
+        if not changed & self.linear:
+            return force
+        velocity = stack(motion.rates, equations, motion.rates[equations[0]])
+        rate = jnp.linalg.solve(run.mass_matrix(), force + run.damping_matrix() @ velocity)
+        return self.mass_matrix() @ rate - self.damping_matrix() @ velocity
+
+    def _force(self, motion: Motion) -> Float[Array, "*k n"]:
         total = self.own_force(motion)
         for effect in self.effects:
             if isinstance(effect, AbstractForce):
@@ -206,7 +264,8 @@ class AbstractVehicle(eqx.Module):
             named: dict[str, Signal] = {e: rates[..., i] for i, e in enumerate(self.layout.equations)}
             motion = dataclasses.replace(motion, accelerations=named)
         true = self.channels(motion)
-        shown = {output.name: self.sensors.show(output, true, motion) for output in self.layout.outputs}
+        sensors = self.of_run(motion.positions).sensors
+        shown = {output.name: sensors.show(output, true, motion) for output in self.layout.outputs}
         return {name: jnp.broadcast_to(jnp.asarray(one), times.shape) for name, one in shown.items()}, motion
 
     def deviation(self, measured: Float[Array, "*k c"], modelled: Float[Array, "*k c"]) -> Float[Array, "*k c"]:

@@ -20,6 +20,7 @@ from ..effects import (
     Motion,
     alike,
     options,
+    parameter_table,
 )
 from ..errors import InputError, nearest
 from .actuators import Actuator
@@ -28,6 +29,7 @@ from .inertia import indefinite
 from .mechanism import Mechanism
 from .products import ACTUATORS
 from .schema import unknown_key
+from .sensors.sensors import MOUNTING
 from .submerged_body import CURRENT, SubmergedBody
 
 MOST_COORDINATES = 30
@@ -158,6 +160,19 @@ def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
             if channel not in layout.channels:
                 hint = nearest(channel, list(layout.channels)) or "a channel of [outputs]"
                 raise InputError(place, f"no channel {channel}", f"use {hint}")
+
+
+def check_variation(vehicle: SubmergedBody | Mechanism, where: str) -> None:
+    """Refuse numbers that differ by run where the model has no run: in what commands and columns pass before it."""
+    inputs = tuple(name for name, _ in vehicle.layout.inputs)
+    rows = {row.name: e for e in vehicle.effects for row in parameter_table(e).values()}
+    for name in vehicle.spreads:
+        owner, _, symbol = name.rpartition(".")
+        effect = rows.get(name)
+        before = effect is not None and not isinstance(effect, AbstractForce)
+        if before or (name in vehicle.sensors.numbers and (owner in inputs or symbol in MOUNTING)):
+            known = "numbers of the body, coefficients, actuators, forces of effects, scales and offsets of outputs"
+            raise InputError(f"{where}: {name}.varies", "cannot differ by run", f"delete it; these can: {known}")
 
 
 def _at_rest(vehicle: SubmergedBody | Mechanism) -> Motion:

@@ -8,6 +8,11 @@ from .sensors.output import ANGLES, SPECIFIC_FORCE, Output, channel_unit
 from .ties import Tie
 
 
+def deviation(name: str) -> str:
+    """The state that is a run's deviation from the mean of the number `name`, which differs by run."""
+    return f"{name}.deviation"
+
+
 @dataclasses.dataclass(frozen=True)
 class Layout:
     """The names in a vehicle file: everything about a vehicle that is not a number to estimate.
@@ -16,7 +21,7 @@ class Layout:
 
     - `name`, `kind`: as in the file.
     - `equations`: the free equations of motion, in order; `positions`: the position states, in order, then those of
-      effects with a memory.
+      effects with a memory, and the deviations of numbers that differ by run.
     - `inputs`, `prescribed`, `environment`: (name in the model, column in the recording) pairs. Inputs are held
       between samples; the other two are interpolated.
     - `outputs`: the measured channels.
@@ -97,11 +102,25 @@ class Layout:
         """The parameters that an estimator may move."""
         return [parameter for parameter in self.parameters if parameter.free]
 
+    @property
+    def deviations(self) -> dict[str, Parameter]:
+        """By state the number that differs by run of which it is the deviation."""
+        return {deviation(row.name): row for row in self.parameters if row.varies}
+
+    @property
+    def at_mean(self) -> "Layout":
+        """That of a vehicle none of whose numbers differs by run."""
+        rows = tuple(dataclasses.replace(row, varies=False, spread=0.0) for row in self.parameters)
+        positions = tuple(name for name in self.positions if name not in self.deviations)
+        return dataclasses.replace(self, parameters=rows, positions=positions)
+
     def unit(self, name: str) -> str:
         """The SI unit of an output, or of a body's channel or state.
 
         Nothing for a mechanism's that states none: its `q` may be in metres or volts.
         """
+        if name in self.deviations:
+            return self.deviations[name].unit
         output = next((one for one in self.outputs if one.name == name), Output(name))
         return output.unit or (channel_unit(output.channel) if self.kind == "submerged-body" else "")
 

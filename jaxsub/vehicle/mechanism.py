@@ -27,12 +27,14 @@ class Mechanism(AbstractVehicle):
 
     - `coefficients`: SI, or any consistent units where the inertia is scaled to 1.
     - `sensors`: scales and offsets of what is measured.
+    - `spreads`: standard deviations between runs of numbers that differ by run.
     """
 
     coefficients: dict[str, Float[Array, ""]]
     layout: Layout = eqx.field(static=True)
     effects: tuple[AbstractEffect, ...] = ()
     sensors: Sensors = eqx.field(default_factory=Sensors)
+    spreads: dict[str, Array] = eqx.field(default_factory=dict)
 
     def mass_matrix(self) -> Float[Values, "n n"]:
         """I."""
@@ -63,7 +65,7 @@ class Mechanism(AbstractVehicle):
         surroundings = dict(zip(environment, columns[len(names) :], strict=True))
         return Motion(
             rates, positions, actuators, surroundings, self.mass_matrix(), 0.0, 0.0, time,
-            actuation=RigActuation(self._drives),
+            actuation=self.actuation,
         )  # fmt: skip
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
@@ -80,6 +82,16 @@ class Mechanism(AbstractVehicle):
         """The inputs of which not every `B_q_input` is free."""
         free = {row.name for row in self.layout.free}
         return tuple(a for a, own in self._drives.items() if not {f"B_{e}_{a}" for e in own} <= free)
+
+    @property
+    def actuation(self) -> RigActuation:
+        """By coordinate."""
+        return RigActuation(self._drives)
+
+    @property
+    def linear(self) -> frozenset[str]:
+        """I and D."""
+        return frozenset(name for name in self.coefficients if name.startswith(("I_", "D_")))
 
     def own_position_rates(self, motion: Motion) -> dict[str, Signal]:
         """The rates themselves."""

@@ -34,7 +34,7 @@ class Scales:
         """The value of a derivative and its row in SI."""
         mass, length, time = term.dimension
         unit = self.mass**mass * self.length**length * self.time**time
-        scaled = {key: unit * getattr(row, key) for key in ("lower", "upper", "prior_std", "prior_mean")}
+        scaled = {key: unit * getattr(row, key) for key in ("lower", "upper", "prior_std", "prior_mean", "spread")}
         return unit * value, dataclasses.replace(row, **scaled)
 
 

@@ -11,7 +11,7 @@ from ..units import UnknownUnit, is_si, same_dimension, si_unit
 
 # the largest size of a number, and its inverse the smallest: what a model makes of several such is a float still
 _LARGEST = 1e60
-_NUMBER_KEYS = ("value", "fixed", "free", "bounds", "prior_std", "prior_mean", "unit")
+_NUMBER_KEYS = ("value", "fixed", "free", "bounds", "prior_std", "prior_mean", "varies", "spread", "unit")
 
 
 class Table:
@@ -99,7 +99,10 @@ def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Para
     low, high = _bounds(table.data.get("bounds", [default.lower, default.upper]), place)
     if not low <= value <= high:
         raise InputError(place, f"value {value:g} lies outside its bounds [{low:g}, {high:g}]", "mend one of them")
-    row = dataclasses.replace(default, free=_freedom(table, place, default.free), lower=low, upper=high)
+    row = dataclasses.replace(default, lower=low, upper=high, **_variation(table, place))
+    row = dataclasses.replace(row, free=_freedom(table, place, default.free or row.varies))
+    if row.varies and not row.free:
+        raise InputError(place, "is fixed and differs by run", "delete fixed, or varies")
     if "prior_std" in table.data:
         row = dataclasses.replace(row, prior_std=_real(table.data["prior_std"]), prior_mean=value)
         if not row.prior_std > 0.0:
@@ -111,6 +114,18 @@ def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Para
             raise InputError(f"{place}.prior_mean", "is given without prior_std", "add prior_std = …")
         row = dataclasses.replace(row, prior_mean=read_finite(table.data["prior_mean"], f"{place}.prior_mean"))
     return value, dataclasses.replace(row, unit=_unit(table, place, default.unit))
+
+
+def _variation(table: Table, place: str) -> dict[str, Any]:
+    """Whether a number differs by run, and its standard deviation between runs where its `table` gives one."""
+    if "varies" not in table.data:
+        if "spread" in table.data:
+            raise InputError(f"{place}.spread", "is given without varies", 'add varies = "run"')
+        return {}
+    if table.data["varies"] != "run":
+        raise InputError(f"{place}.varies", f"is {table.data['varies']!r:.60}", 'write varies = "run"')
+    given = "spread" in table.data
+    return {"varies": True, "spread": read_positive(table.data["spread"], f"{place}.spread") if given else 0.0}
 
 
 def _freedom(table: Table, place: str, free: bool) -> bool:

@@ -46,6 +46,7 @@ class SubmergedBody(AbstractVehicle):
     - `actuators`: what pushes, lifts and weighs by a command, beside the derivatives by inputs.
     - `sensors`: scales, offsets and mountings of what is measured.
     - `cruise`: operating speed U_c, m/s.
+    - `spreads`: standard deviations between runs of numbers that differ by run, SI.
     - `coriolis`: `linear` about the operating speed, where added mass has its share in the linear derivatives; `full`
       for rigid body and added mass; `rigid-body` where derivatives such as `X_wq` hold what is the added mass's.
     """
@@ -60,6 +61,7 @@ class SubmergedBody(AbstractVehicle):
     coriolis: str = eqx.field(static=True, default="linear")
     actuators: Actuators = eqx.field(default_factory=Actuators)
     sensors: Sensors = eqx.field(default_factory=Sensors)
+    spreads: dict[str, Array] = eqx.field(default_factory=dict)
 
     def mass_matrix(self) -> Float[Values, "n n"]:
         """Inertia of the free equations."""
@@ -98,21 +100,22 @@ class SubmergedBody(AbstractVehicle):
         names += [f"environment {n}" for n, _ in self.layout.environment]
         columns, time = timed(self.layout, signals, state[..., 0])
         known: dict[str, Signal] = dict(zip(names, columns, strict=True))
-        for name, _ in self.layout.prescribed:
-            known[name] = self.sensors.true(name, known[name])
-        pick = lambda kind: {n.removeprefix(kind): v for n, v in known.items() if n.startswith(kind)}
         known |= {name: state[..., i] for i, name in enumerate(self.layout.states)}
+        run = self.of_run(known)
+        for name, _ in self.layout.prescribed:
+            known[name] = run.sensors.true(name, known[name])
+        pick = lambda kind: {n.removeprefix(kind): v for n, v in known.items() if n.startswith(kind)}
         zero = jnp.zeros_like(state[..., 0])
         rates = {e: known.get(VELOCITIES[e], zero) for e in EQUATIONS}
         if "u" not in known:
-            rates["surge"] = zero + self.cruise
+            rates["surge"] = zero + run.cruise
         environment = pick("environment ")
-        buoyancy = self.restoring.buoyancy(environment)
+        buoyancy = run.restoring.buoyancy(environment)
         positions = {name: known.get(name, zero) for name in (*_POSITIONS, *self.layout.positions)}
         water = self._water(positions, environment, zero)
         return Motion(
-            rates, positions, pick("input "), environment, self.inertia.matrix(), buoyancy, self.cruise, time,
-            water=water, actuation=self._actuation,
+            rates, positions, pick("input "), environment, self.inertia.matrix(), buoyancy, run.cruise, time,
+            water=water, actuation=self.actuation,
         )  # fmt: skip
 
     def own_force(self, motion: Motion) -> dict[str, Signal]:
@@ -148,7 +151,17 @@ class SubmergedBody(AbstractVehicle):
     @property
     def fixed_gains(self) -> tuple[str, ...]:
         """The devices whose `gain` is not free, and inputs of which not every coefficient is."""
-        return self._actuation.fixed_gains(self.layout)
+        return self.actuation.fixed_gains(self.layout)
+
+    @property
+    def actuation(self) -> BodyActuation:
+        """By products of inputs, and by devices."""
+        return BodyActuation(self.products, self.actuators)
+
+    @property
+    def linear(self) -> frozenset[str]:
+        """Masses, linear damping, and the operating speed."""
+        return frozenset((*self.inertia.rigid, *self.inertia.added, *self.damping.coefficients, "speed"))
 
     @property
     def aliases(self) -> dict[str, str]:
@@ -173,10 +186,6 @@ class SubmergedBody(AbstractVehicle):
         found = velocities | {name: motion.positions[name] for name in _POSITIONS}
         found |= {"depth": motion.positions["z"], "depth_rate": rates["z"], "heading_rate": rates["psi"]}
         return found | {"speed": jnp.sqrt(u**2 + v**2 + w**2 + 1e-12)}
-
-    @property
-    def _actuation(self) -> BodyActuation:
-        return BodyActuation(self.products, self.actuators)
 
     def _damping(self) -> Float[Values, "6 6"]:
         if self.coriolis != "linear":

@@ -1,5 +1,6 @@
 """Vehicle files out: a vehicle to TOML (formats.md)."""
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,9 @@ def write_vehicle(vehicle: AbstractVehicle, path: str | Path, comment: str = "")
 def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     """The vehicle file of `vehicle` as text."""
     layout, values = vehicle.layout, {name: float(v) for name, v in vehicle.values().items()}
-    rows = {row.name: row for row in layout.parameters}
+    spreads = {name: float(spread) for name, spread in vehicle.spreads.items()}
+    known = {name: spread if spread > 0.0 else 0.0 for name, spread in spreads.items()}
+    rows = {row.name: dataclasses.replace(row, spread=known.get(row.name, 0.0)) for row in layout.parameters}
     document = tomlkit.document()
     for line in comment.splitlines():
         document.add(tomlkit.comment(line))
@@ -120,6 +123,10 @@ def _number_table(value: float, row: Parameter | None, default: Parameter, unit:
     mean = value if "prior_std" in table or not math.isfinite(row.prior_std) else default.prior_mean
     if math.isfinite(row.prior_std) and row.prior_mean != mean:
         table["prior_mean"] = row.prior_mean
+    if row.varies:
+        table["varies"] = "run"
+        if row.spread:
+            table["spread"] = row.spread
     if unit:
         table["unit"] = unit
     return value if not default.free and len(table) == 1 else table
