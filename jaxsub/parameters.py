@@ -41,7 +41,7 @@ class Parameter:
     - `prior_std`: standard deviation of a Gaussian prior about `prior_mean`, infinite where there is none.
     - `prior_mean`: the value that the vehicle file gives.
     - `varies`: whether it differs by run about a common mean, which bounds and prior are then for.
-    - `spread`: standard deviation between runs as the file gives it, 0 where it is to be estimated.
+    - `spread`: standard deviation between runs where a file gives it; a vehicle has it among its `spreads`.
     """
 
     name: str

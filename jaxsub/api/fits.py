@@ -17,11 +17,13 @@ from ..estimate import (
     Assessment,
     ChannelResidual,
     Passes,
+    RunVariation,
     Solution,
     assess,
     batch,
     posterior,
     require_free,
+    require_runs,
 )
 from ..estimate import fit as solve
 from ..findings import Finding
@@ -68,7 +70,8 @@ def fit(vehicle: AbstractVehicle, recordings: Recordings, *, method: str | Abstr
     require_free(vehicle, vehicle.layout.name)
     runs = checked(vehicle, recordings)
     used = runs.recordings
-    found = fitted(vehicle, batch(vehicle, used).padded(), [run.source for run in used], method).identified()
+    names = [run.name for run in used]
+    found = fitted(vehicle, batch(vehicle, used).padded(), [run.source for run in used], names, method).identified()
     return dataclasses.replace(found, recordings=used, findings=runs.findings)
 
 
@@ -86,21 +89,24 @@ def fitted(
     vehicle: AbstractVehicle,
     runs: Runs,
     sources: Sequence[str],
+    names: Sequence[str],
     method: str | AbstractMethod,
     *,
     file: str = "",
     passes: Passes | None = None,
 ) -> "Fit":
-    """The fit of `vehicle`, which may be from a `file`, to checked runs from `sources`.
+    """The fit of `vehicle`, which may be from a `file`, to checked runs from `sources`, by `names`.
 
-    `passes` is told as by `estimate.fit`. **Raises** `InputError` where the model does not run.
+    `passes` is told as by `estimate.fit`. **Raises** `InputError` where the model does not run, and where one run has
+    to show how much a number differs by run.
     """
+    require_runs(vehicle, len(runs.times), file or vehicle.layout.name)
     found = solve(vehicle, runs, method=_estimator(method), passes=passes)
     if not np.isfinite(float(found.cost)):
         what = "the model does not run from these values"
         raise InputError(file or vehicle.layout.name, what, "give values that are closer, or another method")
     name = method if isinstance(method, str) else type(method).__name__
-    return Fit(found, name, ", ".join(dict.fromkeys(sources)), assess(found))
+    return Fit(found, name, ", ".join(dict.fromkeys(sources)), assess(found), tuple(names))
 
 
 def _estimator(method: str | AbstractMethod) -> AbstractMethod | None:
@@ -121,7 +127,8 @@ class Fit(AbstractResult):
     **Fields**
 
     - `solution`: where the search ended, with its statistics. `method`: the estimator's name.
-    - `where`: the files or processes that made the runs. `assessment`: whether the fit explains them.
+    - `where`: the files or processes that made the runs. `assessment`: whether the fit explains them. `runs`: their
+      names.
     - `identifiability`: what they identify. `coloured`: standard errors that allow for coloured residuals. None before
       `identified` or `completed`.
     - `recordings`: the runs as they were used. `findings`: what reading and checking found in them.
@@ -131,6 +138,7 @@ class Fit(AbstractResult):
     method: str
     where: str
     assessment: Assessment
+    runs: tuple[str, ...] = ()
     identifiability: Identifiability | None = None
     coloured: Coloured | None = None
     recordings: tuple[Recording, ...] = ()
@@ -190,6 +198,11 @@ class Fit(AbstractResult):
         """The coefficients with units, standard errors and verdicts, by what was asked so far."""
         return estimates(self.solution, self.identifiability, self.coloured)
 
+    @cached_property
+    def variations(self) -> tuple[RunVariation, ...]:
+        """The numbers that differ by run: standard deviation between runs, and each run's own value."""
+        return self.solution.variations
+
     @property
     def warnings(self) -> list[Finding]:
         """A search that did not converge, runs that are not explained, coefficients at a bound."""
@@ -223,7 +236,9 @@ class Fit(AbstractResult):
         """As `parts`, by what was asked so far."""
         said = self.identifiability
         sentences = said.sentences() if said else ["What the recordings identify was not asked: interrupted."]
-        return [*self._headline(), self.channel_table(), *sentences, self.coefficient_table()]
+        differing = [self.variation_table()] if self.variations else []
+        sentences += [variation.sentence() for variation in self.variations]
+        return [*self._headline(), self.channel_table(), *sentences, self.coefficient_table(), *differing]
 
     def _headline(self) -> list[str]:
         ending = [] if self.converged else [f"The fit did not converge: {self._ending()}."]
@@ -254,6 +269,15 @@ class Fit(AbstractResult):
             for e in self.estimates
         ]
         return Table(heads, rows)
+
+    def variation_table(self) -> Table:
+        """Each run's own value of the numbers that differ by run."""
+        rows = [
+            (one.name, run, f"{value:.6g}", f"{error:.2g}", unit(one.unit))
+            for one in self.variations
+            for run, value, error in zip(self.runs, one.values, one.errors, strict=True)
+        ]
+        return Table(("differs by run", "run", "value", "standard error", "unit"), rows)
 
     def plot(self, run: int = 0) -> "Picture":
         """The recording numbered `run` with the fit's simulation and its residuals, for the channels that fit worst."""
@@ -310,7 +334,14 @@ class Fit(AbstractResult):
                 "verdicts": said.verdicts,
             },
             "coefficients": {e.name: _without_name(e) for e in self.estimates},
+            "by_run": {one.name: self._by_run(one) for one in self.variations},
         }
+
+    def _by_run(self, one: RunVariation) -> dict[str, Any]:
+        spread = {"value": one.spread, "standard_error": one.spread_error, "estimated": one.estimated}
+        each = zip(self.runs, one.values, one.errors, strict=True)
+        runs = [{"run": run, "value": float(value), "standard_error": float(error)} for run, value, error in each]
+        return {"unit": one.unit, "spread": spread, "runs": runs}
 
     def write(self, folder: Path) -> None:
         """Write `fitted.toml`, `coefficients.csv` and `identification.json` into `folder`."""

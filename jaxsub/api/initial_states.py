@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..errors import InputError
-from ..estimate import initial_guess, rest, search, state_channels
+from ..estimate import initial_guess, rest, search, state_channels, unknown_spreads
 from ..findings import Finding
 from ..recording import Recording
 from ..recording.runs import Runs
@@ -39,6 +39,18 @@ def initial_state(
     Where nothing is measured the model starts at rest. **Raises** `InputError` for a recorded start of which a sensor's
     first sample is later than the longest interval between its samples, or an estimated one with which it diverges.
     """
+    began, state, findings = _initial_state(vehicle, runs, recording, start)
+    unknown = unknown_spreads(vehicle)
+    if not unknown:
+        return began, state, findings
+    what = f"how much {', '.join(unknown)} differs between runs is not known; the run has the mean"
+    remedy = "take the vehicle from `jaxsub identify`, or give spread = … beside varies"
+    return began, state, [*findings, Finding("initial-state", "note", recording.source, what, remedy)]
+
+
+def _initial_state(
+    vehicle: AbstractVehicle, runs: Runs, recording: Recording, start: Start
+) -> tuple[Start, Float[Array, " s"], list[Finding]]:
     where = recording.source
     if start != "rest" and not np.any(np.asarray(runs.mask)):
         what = f"has no sample of {', '.join(vehicle.layout.channels)}; the model starts at rest"

@@ -41,7 +41,7 @@ def run(
         vehicle = read_vehicle(vehicle_path)
         require_free(vehicle, str(vehicle_path))
         recordings = load_runs(runs, vehicle, columns)
-        stacked = batch(vehicle, recordings).padded()
+        stacked, names = batch(vehicle, recordings).padded(), [recording.name for recording in recordings]
         del recordings
         effort = Effort(vehicle, stacked)
         if announcement := effort.announcement():
@@ -49,7 +49,7 @@ def run(
         with terminal.progress(f"identifying {vehicle.layout.name}") as told:
             told(f"fitting by {method}")
             left = TimeLeft(told, f"fitting by {method}")
-            found = fitted(vehicle, stacked, list(map(str, runs)), method, file=str(vehicle_path), passes=left)
+            found = fitted(vehicle, stacked, list(map(str, runs)), names, method, file=str(vehicle_path), passes=left)
             _keep(found, fresh, out)
             told(_FOLLOWS)
             identified = _followed(found, TimeLeft(told, _FOLLOWS))

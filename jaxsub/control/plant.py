@@ -191,11 +191,13 @@ def discretise(
     """The plant of `vehicle` for samples `dt` s apart, each of `substeps` steps.
 
     `given` are constants by column name, SI: prescribed motions and surroundings, all of which it needs, and inputs
-    that nobody is to move. The other inputs are the plant's, in the file's order.
+    that nobody is to move. The other inputs are the plant's, in the file's order. A number that differs by run has its
+    mean.
 
     **Raises** `InputError` for a `dt` that is not positive, a column that is missing or unknown, and an effect that
     does not say how it goes on from sample to sample.
     """
+    vehicle = vehicle.at_mean
     layout, given = vehicle.layout, {} if given is None else given
     if not dt > 0.0:
         raise InputError(f"{layout.name}: dt", f"{dt:g} s is not positive", "give the time between samples in s")

@@ -2,6 +2,7 @@
 
 from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_residuals
 from .batches import batch, side_by_side
+from .between_runs import RunVariation, require_runs, unknown_spreads
 from .combined import Chain, Global
 from .disturbance import estimate_disturbance
 from .filtered import Filtered
@@ -44,6 +45,7 @@ __all__ = [
     "Passes",
     "Problem",
     "Rate",
+    "RunVariation",
     "SearchEnd",
     "Solution",
     "assess",
@@ -68,6 +70,7 @@ __all__ = [
     "posterior",
     "race",
     "require_free",
+    "require_runs",
     "rest",
     "scattered",
     "scattered_by_number",
@@ -79,4 +82,5 @@ __all__ = [
     "substeps_for",
     "substeps_unseen",
     "success",
+    "unknown_spreads",
 ]

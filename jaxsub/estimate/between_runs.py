@@ -1,8 +1,8 @@
 r"""Numbers that differ by run: $\theta_r = \bar\theta + \Delta_r$, $\Delta_r\sim N(0, s^2)$, and each run's own value.
 
-$\Delta_r$ is an initial state of the run, so a fit has its most probable value for a given s. About such a fit the model
-is linear in the coefficients, the initial states and the $\Delta_r$, and s maximises the likelihood with all of those
-integrated out: the restricted likelihood of a linear mixed model. That of R runs which measure $\theta_r$ exactly is
+$\Delta_r$ is an initial state of the run, so a fit has its most probable value for a given s. About such a fit the
+model is linear in coefficients, initial states and $\Delta_r$, and s maximises the likelihood with all of those
+integrated out: the restricted likelihood of a linear mixed model. For R runs that measure $\theta_r$ exactly it gives
 $s^2 = \sum(\theta_r - \bar\theta)^2/(R-1)$. Source: Pinheiro and Bates (2000), §2.2 and §7.2.
 """
 
@@ -38,31 +38,43 @@ class RunVariation:
 
     **Fields**
 
-    - `name`, `unit`, `mean`: SI; `mean_error`: the mean's standard error.
-    - `spread`: standard deviation between runs; `spread_error`: its standard error, None where it was given or is zero.
-    - `values`, `errors`: (R,) each run's own value, and its standard error.
+    - `name`, `unit`: SI. `spread`: standard deviation between runs; `estimated`: whether it was not given.
+    - `spread_error`: its standard error, None where it was given or is zero.
+    - `values`, `errors`: (R,) each run's own value, and its standard error for white residuals of the given σ.
     """
 
     name: str
     unit: str
-    mean: float
-    mean_error: float
     spread: float
+    estimated: bool
     spread_error: float | None
     values: np.ndarray
     errors: np.ndarray
 
+    def sentence(self) -> str:
+        """What differs, and by how much."""
+        if not self.spread > 0.0:
+            return f"{self.name}: the {len(self.values)} runs do not differ beyond their noise; all have the mean."
+        error = f" (standard error {self.spread_error:.2g})" if self.spread_error is not None else ""
+        size = f"{self.spread:.3g} {self.unit}".rstrip()
+        source = f"estimated from {len(self.values)} runs" if self.estimated else "as given"
+        return f"{self.name} differs by run: standard deviation between runs {size}{error}, {source}."
 
-def unknown_spreads(vehicle: AbstractVehicle, runs: int) -> tuple[str, ...]:
-    """The numbers whose standard deviation between `runs` runs is still to be estimated.
 
-    **Raises** `InputError` where one run has to show it.
+def unknown_spreads(vehicle: AbstractVehicle) -> tuple[str, ...]:
+    """The numbers whose standard deviation between runs is still to be estimated."""
+    return tuple(name for name, spread in vehicle.spreads.items() if np.isnan(float(spread)))
+
+
+def require_runs(vehicle: AbstractVehicle, runs: int, where: str) -> None:
+    """So many runs show how much the numbers of `vehicle`, read from `where`, differ by run.
+
+    **Raises** `InputError` where one run has to.
     """
-    names = tuple(name for name, spread in vehicle.spreads.items() if np.isnan(float(spread)))
+    names = unknown_spreads(vehicle)
     if names and runs < 2:
         what = f"{', '.join(names)} differ{'s' if len(names) == 1 else ''} by run, and there is one run"
-        raise InputError(vehicle.layout.name, what, "give more runs, or spread = … in the vehicle file")
-    return names
+        raise InputError(where, what, "give more runs, or spread = … beside varies")
 
 
 def wide_spreads(vehicle: AbstractVehicle, names: Sequence[str]) -> dict[str, float]:
@@ -119,12 +131,11 @@ def run_variations(
         at, size = states.index(state), float(vehicle.spreads[row.name])
         moved = (np.array(free) == row.name) - spread[at] * gain[:, at]
         variance = spread[at] ** 2 * own[:, at, at] + np.einsum("rp,pq,rq->r", moved, np.asarray(covariance), moved)
-        index = free.index(row.name) if row.name in free else None
-        mean_error = 0.0 if index is None else float(np.sqrt(np.asarray(covariance)[index, index]))
-        error = spread_errors.get(row.name)
+        error = spread_errors.get(row.name, np.nan)
+        spread_error = float(size * error) if np.isfinite(error) else None
         own_values = float(values[row.name]) + np.asarray(start)[:, at]
-        numbers = (float(values[row.name]), mean_error, size, None if error is None else size * error)
-        found.append(RunVariation(row.name, row.unit, *numbers, own_values, np.sqrt(variance)))
+        given = row.name not in estimated
+        found.append(RunVariation(row.name, row.unit, size, not given, spread_error, own_values, np.sqrt(variance)))
     return tuple(found)
 
 

@@ -19,7 +19,15 @@ from ..recording.runs import Runs
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .batches import batch
-from .between_runs import RunVariation, estimate_spreads, run_variations, unknown_spreads, wide_spreads, with_spreads
+from .between_runs import (
+    RunVariation,
+    estimate_spreads,
+    require_runs,
+    run_variations,
+    unknown_spreads,
+    wide_spreads,
+    with_spreads,
+)
 from .blockwise import Descent, raced
 from .curvature import decoupled
 from .method import AbstractMethod, Passes, unwatched
@@ -184,7 +192,9 @@ def search(
     if estimated.any():
         noise = np.where(estimated, np.asarray(_signal(runs)), noise)
     noise = jax.device_put(noise)
-    varied = unknown_spreads(vehicle, len(runs.times)) if moving and not known_start else ()
+    varied = unknown_spreads(vehicle) if moving and not known_start else ()
+    if varied:
+        require_runs(vehicle, len(runs.times), vehicle.layout.name)
     vehicle = vehicle.with_spreads(wide_spreads(vehicle, varied)) if varied else vehicle
     problem = Problem.of(vehicle, runs, noise, start, moving=moving, known_start=known_start)
     y, total = problem.coordinates(), 0

@@ -24,7 +24,10 @@ _PARTNERS = dict(zip("uvwpqr", ("x", "y", "z", "phi", "theta", "psi"), strict=Tr
 
 
 def state_scale(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values, " s"]:
-    """For each state the noise of its channel, SI; else that of its rate or its integral over a second; else usual."""
+    """For each state the noise of its channel, SI; else that of its rate or its integral over a second; else usual.
+
+    A deviation of a number that differs by run has that between runs, none where it is not known.
+    """
     layout = vehicle.layout
     plain = layout.plain
     measured = zip(layout.outputs, sigma, strict=True)
@@ -34,7 +37,9 @@ def state_scale(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[V
     partner = _PARTNERS if layout.kind == "submerged-body" else {f"{e}_rate": e for e in layout.equations}
     partner = partner | {position: rate for rate, position in partner.items()}
     usual = lambda name: np.asarray(_USUAL.get(CHANNEL_UNITS.get(name, ""), 1.0))
-    return namespace(sigma).stack([known.get(n, known.get(partner.get(n, ""), usual(n))) for n in layout.states])
+    known |= {state: jnp.nan_to_num(vehicle.spreads[row.name]) for state, row in layout.deviations.items()}
+    sizes = [known.get(n, known.get(partner.get(n, ""), usual(n))) for n in layout.states]
+    return namespace(*sizes).stack(sizes)
 
 
 def vehicle_filter(
@@ -42,4 +47,6 @@ def vehicle_filter(
 ) -> AbstractFilter:
     """A filter of `process` with sensors of noise `sigma` (SI), the state's initial and process noise in its terms."""
     scale = state_scale(process.vehicle, sigma)
-    return kind(process, ConstantNoise(jnp.diag(DENSITY * scale)), jnp.diag(sigma), jnp.diag(scale))
+    layout = process.vehicle.layout
+    moving = jnp.array([name not in layout.deviations for name in layout.states])
+    return kind(process, ConstantNoise(jnp.diag(DENSITY * scale * moving)), jnp.diag(sigma), jnp.diag(scale))

@@ -117,7 +117,7 @@ def identifiability(fit: Solution, assessment: Assessment | None = None, watch: 
     for vector in directions.vectors.T[open_]:
         vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
         null.append({n: round(float(d), 3) for n, d in zip(fit.names, vector, strict=True) if abs(d) > _SHOWN})
-    families = tuple(equivalent_systems(fit.vehicle)) if len(open_) else ()
+    families = tuple(equivalent_systems(fit.vehicle.at_mean)) if len(open_) else ()
     assessment = assess(fit) if assessment is None else assessment
     verdicts = tuple(_withheld(verdict, fit, assessment) for verdict in _verdicts(fit, directions, families))
     p = len(fit.names)

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..errors import InputError
-from ..estimate import METHODS, Problem, batch, scattered_by_number, search, share_for
+from ..estimate import METHODS, Problem, batch, scattered_by_number, search, share_for, unknown_spreads
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
 
@@ -105,6 +105,9 @@ class Plan:
         made = []
         for index, (name, recorded) in enumerate(self.cases):
             vehicle = self.vehicles[name]
+            if unknown := unknown_spreads(vehicle):
+                what = f"how much {', '.join(unknown)} differs between runs is not known"
+                raise InputError(f"sweep: vehicle {name}", what, "identify it first, or give spread = … beside varies")
             known = None if self.sigma is None else jnp.asarray(self.sigma[index])
             sigma = jnp.array([output.sigma or 1.0 for output in vehicle.layout.outputs]) if known is None else known
             problem = Problem.of(vehicle, batch(vehicle, self.recordings[recorded]), sigma)

@@ -92,6 +92,9 @@ def build(
         values = _complete(values, where)
         hull = _sizes(values, hull)
     rows += effect_rows
+    spreads = {row.name: number(row.spread or math.nan) for row in rows if row.varies}
+    # a number of the vehicle and not of its layout, for which programs are compiled
+    rows = tuple(dataclasses.replace(row, spread=0.0) for row in rows)
     equations = dof or EQUATIONS
     shown = tuple(output.state for output in outputs)
     positions = _positions(equations, dict(prescribed), shown) if kind == "submerged-body" else equations
@@ -109,7 +112,6 @@ def build(
         body = _body(values, layout, effects, devices, density, where)
         vehicle = dataclasses.replace(body, coriolis=coriolis)
     sensors = Sensors({key: number(value) for key, (value, _) in of_sensors.items()}, density)
-    spreads = {row.name: number(row.spread or math.nan) for row in rows if row.varies}
     vehicle = dataclasses.replace(vehicle, sensors=sensors, spreads=spreads)
     if ties:
         vehicle = vehicle.with_values({})  # the numbers of effects and sensors that follow others

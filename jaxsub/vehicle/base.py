@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from ..arrays import Values
 from ..effects import (
@@ -154,12 +154,12 @@ class AbstractVehicle(eqx.Module):
         spreads = {name: spread for name, spread in self.spreads.items() if name not in gone}
         return dataclasses.replace(self, effects=kept, layout=layout, spreads=spreads)
 
-    def with_spreads(self, spreads: Mapping[str, Values]) -> Self:
+    def with_spreads(self, spreads: Mapping[str, ArrayLike]) -> Self:
         """The same vehicle with other standard deviations between runs of the numbers named, SI."""
         return dataclasses.replace(self, spreads={n: number(spreads.get(n, old)) for n, old in self.spreads.items()})
 
     def of_run(self, positions: Mapping[str, Signal]) -> Self:
-        """The vehicle with the numbers of the run in which `positions` are; itself where none differs by run."""
+        """The vehicle with the numbers of the run of which `positions` are, one sample; itself where none differs."""
         if not self.spreads:
             return self
         values = self.values()
@@ -196,7 +196,7 @@ class AbstractVehicle(eqx.Module):
         $\tilde M\tilde M_r^{-1}(\tau_r + \tilde A_r\nu) - \tilde A\nu$, so that $\dot\nu$ is the run's.
         """
         if self.spreads:
-            return sample_by_sample(self._force_of_run, motion, motion.rates[self.layout.equations[0]].shape)
+            return sample_by_sample(self._force_of_run, motion.rates[self.layout.equations[0]].shape, motion)
         return self._force(motion)
 
     def _force_of_run(self, motion: Motion) -> Float[Array, " n"]:
@@ -264,8 +264,12 @@ class AbstractVehicle(eqx.Module):
             named: dict[str, Signal] = {e: rates[..., i] for i, e in enumerate(self.layout.equations)}
             motion = dataclasses.replace(motion, accelerations=named)
         true = self.channels(motion)
-        sensors = self.of_run(motion.positions).sensors
-        shown = {output.name: sensors.show(output, true, motion) for output in self.layout.outputs}
+
+        def seen(true: dict[str, Signal], motion: Motion) -> dict[str, Signal]:
+            sensors = self.of_run(motion.positions).sensors
+            return {output.name: sensors.show(output, true, motion) for output in self.layout.outputs}
+
+        shown = sample_by_sample(seen, times.shape, true, motion) if self.spreads else seen(true, motion)
         return {name: jnp.broadcast_to(jnp.asarray(one), times.shape) for name, one in shown.items()}, motion
 
     def deviation(self, measured: Float[Array, "*k c"], modelled: Float[Array, "*k c"]) -> Float[Array, "*k c"]:

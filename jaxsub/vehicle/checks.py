@@ -29,7 +29,6 @@ from .inertia import indefinite
 from .mechanism import Mechanism
 from .products import ACTUATORS
 from .schema import unknown_key
-from .sensors.sensors import MOUNTING
 from .submerged_body import CURRENT, SubmergedBody
 
 MOST_COORDINATES = 30
@@ -167,10 +166,9 @@ def check_variation(vehicle: SubmergedBody | Mechanism, where: str) -> None:
     inputs = tuple(name for name, _ in vehicle.layout.inputs)
     rows = {row.name: e for e in vehicle.effects for row in parameter_table(e).values()}
     for name in vehicle.spreads:
-        owner, _, symbol = name.rpartition(".")
         effect = rows.get(name)
         before = effect is not None and not isinstance(effect, AbstractForce)
-        if before or (name in vehicle.sensors.numbers and (owner in inputs or symbol in MOUNTING)):
+        if before or (name in vehicle.sensors.numbers and name.rpartition(".")[0] in inputs):
             known = "numbers of the body, coefficients, actuators, forces of effects, scales and offsets of outputs"
             raise InputError(f"{where}: {name}.varies", "cannot differ by run", f"delete it; these can: {known}")
 

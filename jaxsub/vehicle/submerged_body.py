@@ -21,6 +21,7 @@ from .kinematics import position_rates
 from .products import Products, derivatives
 from .restoring import Restoring
 from .sensors.sensors import Sensors
+from .variation import sample_by_sample
 
 _POSITIONS = ("phi", "theta", "psi", "x", "y", "z")
 CURRENT = ("current_north", "current_east")
@@ -101,20 +102,19 @@ class SubmergedBody(AbstractVehicle):
         columns, time = timed(self.layout, signals, state[..., 0])
         known: dict[str, Signal] = dict(zip(names, columns, strict=True))
         known |= {name: state[..., i] for i, name in enumerate(self.layout.states)}
-        run = self.of_run(known)
-        for name, _ in self.layout.prescribed:
-            known[name] = run.sensors.true(name, known[name])
         pick = lambda kind: {n.removeprefix(kind): v for n, v in known.items() if n.startswith(kind)}
+        environment = pick("environment ")
+        shape = state.shape[:-1] if self.spreads else ()
+        moved, buoyancy, cruise = sample_by_sample(self._of_run, shape, known, environment)
+        known |= moved
         zero = jnp.zeros_like(state[..., 0])
         rates = {e: known.get(VELOCITIES[e], zero) for e in EQUATIONS}
         if "u" not in known:
-            rates["surge"] = zero + run.cruise
-        environment = pick("environment ")
-        buoyancy = run.restoring.buoyancy(environment)
+            rates["surge"] = zero + cruise
         positions = {name: known.get(name, zero) for name in (*_POSITIONS, *self.layout.positions)}
         water = self._water(positions, environment, zero)
         return Motion(
-            rates, positions, pick("input "), environment, self.inertia.matrix(), buoyancy, run.cruise, time,
+            rates, positions, pick("input "), environment, self.inertia.matrix(), buoyancy, cruise, time,
             water=water, actuation=self.actuation,
         )  # fmt: skip
 
@@ -186,6 +186,14 @@ class SubmergedBody(AbstractVehicle):
         found = velocities | {name: motion.positions[name] for name in _POSITIONS}
         found |= {"depth": motion.positions["z"], "depth_rate": rates["z"], "heading_rate": rates["psi"]}
         return found | {"speed": jnp.sqrt(u**2 + v**2 + w**2 + 1e-12)}
+
+    def _of_run(
+        self, known: Mapping[str, Signal], environment: Mapping[str, Signal]
+    ) -> tuple[dict[str, Signal], Signal, Signal]:
+        """Prescribed motions as they were, the displaced weight (N) and the operating speed (m/s) of a run."""
+        run = self.of_run(known)
+        prescribed = {name: run.sensors.true(name, known[name]) for name, _ in self.layout.prescribed}
+        return prescribed, run.restoring.buoyancy(environment), run.cruise
 
     def _damping(self) -> Float[Values, "6 6"]:
         if self.coriolis != "linear":

@@ -1,11 +1,11 @@
-"""Forces of a vehicle some of whose numbers differ by run."""
+"""Motions of a vehicle some of whose numbers differ by run, one sample at a time: each may be of another run."""
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
 
 from ..effects import Motion
 
@@ -13,13 +13,18 @@ from ..effects import Motion
 _MOVING = ("rates", "positions", "actuators", "environment", "buoyancy", "cruise", "time", "accelerations", "water")
 
 
-def sample_by_sample(
-    force: Callable[[Motion], Float[Array, " n"]], motion: Motion, shape: tuple[int, ...]
-) -> Float[Array, "*k n"]:
-    """A force of one sample at each of a motion's samples, which have the leading axes `shape`."""
+def sample_by_sample(function: Callable[..., Any], shape: tuple[int, ...], *arguments: Any) -> Any:
+    """The arrays that `function` of one sample gives at each, of `arguments` that have the leading axes `shape`.
+
+    A motion among them has its inertia and actuation for all samples.
+    """
     if not shape:
-        return force(motion)
-    flat = lambda leaf: jnp.broadcast_to(leaf, shape).reshape(-1)
-    moving = jax.tree.map(flat, {name: getattr(motion, name) for name in _MOVING})
-    found = jax.vmap(lambda parts: force(dataclasses.replace(motion, **parts)))(moving)
-    return found.reshape(*shape, -1)
+        return function(*arguments)
+    moving = [{name: getattr(a, name) for name in _MOVING} if isinstance(a, Motion) else a for a in arguments]
+    flat = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, shape).reshape(-1), moving)
+
+    def one(*parts: Any) -> Any:
+        pairs = zip(arguments, parts, strict=True)
+        return function(*(dataclasses.replace(a, **part) if isinstance(a, Motion) else part for a, part in pairs))
+
+    return jax.tree.map(lambda leaf: leaf.reshape(*shape, *leaf.shape[1:]), jax.vmap(one)(*flat))
