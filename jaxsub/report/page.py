@@ -1,8 +1,11 @@
 """The page: one HTML file with everything in it, and the figures beside it as files."""
 
 import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 from markupsafe import Markup
@@ -17,6 +20,9 @@ from .figures import draw
 from .forces import is_equation, telling_trace
 from .overlay import telling_overlay
 from .residual import located_device
+
+if TYPE_CHECKING:
+    from .explorers import Explorer
 
 _VERDICTS = {
     "none": "no mismatch",
@@ -34,9 +40,10 @@ _KINDS = {
 
 _BY_EFFECTS = (
     " Blue: the force of the effects added. Orange: the same by the recordings, which is what the baseline and the"
-    " force that it lacks make of them; the line is its median."
+    " force that it lacks make of them."
 )
-_BEYOND = " Orange: what the model lacks by the recordings; the line is its median."
+_FORCES = "Above: the force that the model lacks in a training run, with its ±2σ band. Below: force by state."
+_BEYOND = " Orange: what the model lacks by the recordings."
 # as in CITATION.cff
 TITLE = "jaxsub: differentiable models of vehicles that move in water, and a diagnosis of the physics that they lack"
 
@@ -48,15 +55,26 @@ def write_report(diagnosis: Conclusions, vehicle_text: str, folder: Path) -> Non
     """
     pictures = draw(diagnosis)
     write_figures(pictures.values(), folder)
-    (folder / "report.html").write_text(render(diagnosis, vehicle_text, pictures), encoding="utf-8")
+    page = render(diagnosis, vehicle_text, pictures, _explorers(diagnosis))
+    (folder / "report.html").write_text(page, encoding="utf-8")
 
 
-def render(diagnosis: Conclusions, vehicle_text: str, pictures: dict[str, Picture]) -> str:
-    """The page as text, with `pictures` inlined."""
+def render(
+    diagnosis: Conclusions,
+    vehicle_text: str,
+    pictures: dict[str, Picture],
+    shown: "Mapping[str, Explorer] | None" = None,
+) -> str:
+    """The page as text, with `pictures` inlined, and with figures to explore where they are `shown`."""
+    scripts = _scripts() if shown else []
     context: dict[str, Any] = {
         "diagnosis": diagnosis,
         "verdict": _VERDICTS[diagnosis.verdict],
         "pictures": pictures,
+        "explorers": shown or {},
+        "scripts": [Markup(text) for text in scripts],
+        "policy": _policy(scripts),
+        "forces_words": _FORCES + (_BY_EFFECTS if diagnosis.improves else _BEYOND),
         "kinds": {kind: _KINDS.get(kind, kind) for kind in diagnosis.kinds},
         "effects": _added(diagnosis, vehicle_text) if diagnosis.improves else "",
         "key_numbers": _key_numbers(diagnosis),
@@ -80,6 +98,29 @@ def render(diagnosis: Conclusions, vehicle_text: str, pictures: dict[str, Pictur
 
 def _added(diagnosis: Conclusions, vehicle_text: str) -> str:
     return tables.effects_text(vehicle_text, {coefficient.name for coefficient in diagnosis.coefficients})
+
+
+def _explorers(diagnosis: Conclusions) -> "dict[str, Explorer]":
+    """The figures to explore; without Bokeh, as in an environment made with --no-deps, still pictures are all."""
+    if find_spec("bokeh") is None:
+        return {}
+    from .explorers import explorers
+
+    return explorers(diagnosis)
+
+
+def _scripts() -> list[str]:
+    """Bokeh's script, and the one that puts its figures into the page."""
+    from .explorers import script
+
+    return [script(), (Path(__file__).parent / "explorers.js").read_text(encoding="utf-8")]
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    """The page's content security policy: it fetches nothing, and runs its own `scripts` alone."""
+    digests = (base64.b64encode(hashlib.sha256(one.encode()).digest()).decode("ascii") for one in scripts)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+    return f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src {allowed}"
 
 
 def _device_caption(diagnosis: Conclusions) -> str:

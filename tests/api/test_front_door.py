@@ -42,7 +42,7 @@ def test_import_loads_nothing_and_offers_all_names():
     script = """
 import sys
 import jaxsub as js
-assert not {"jax", "numpy", "pandas", "matplotlib"} & set(sys.modules)
+assert not {"jax", "numpy", "pandas", "matplotlib", "bokeh"} & set(sys.modules)
 assert set(js.__all__) <= set(dir(js))
 assert js.__version__ and not {"jax", "numpy"} & set(sys.modules)
 try:

@@ -1,0 +1,124 @@
+"""Figures to explore work in a browser, switch, fit the page's size, fetch nothing, and leave still pictures there."""
+
+import dataclasses
+import html
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from report_examples import VEHICLE, bare, diagnosis
+
+from jaxsub.discrepancy.diagnosis import Overlay
+from jaxsub.report.page import render
+
+pytest.importorskip("bokeh")
+from jaxsub.report.explorers import explorers, script
+
+BROWSER = shutil.which("chromium")
+# what a reader would find: asked of the page once its figures are there
+PROBE = """<pre id="seen"></pre><script>
+setTimeout(() => {
+  const source = () => Bokeh.documents.map((one) => one.get_model_by_name("series")).find(Boolean).data;
+  const before = [source().measured[0], source().time.length];
+  const select = document.querySelector("select[name=channel]");
+  select.value = [...select.options].find((option) => option.textContent === "u").value;
+  select.dispatchEvent(new Event("change"));
+  const root = document.documentElement;
+  document.getElementById("seen").textContent = JSON.stringify({
+    title: document.title, live: document.querySelectorAll(".live > .explorer").length,
+    shown: [...document.querySelectorAll("figure.replaced")].filter((one) => one.offsetHeight > 0).length,
+    before, after: [source().measured[0], source().time.length], options: select.options.length,
+    cut: [...document.querySelectorAll(".scroll")].filter((one) => one.scrollWidth > one.clientWidth + 1).length,
+    wider: root.scrollWidth - root.clientWidth,
+  });
+}, 3000);
+</script></body>"""
+
+
+def opened(page, folder, width=1400):
+    """What the probe finds on the page in headless Chromium, and the lines of its console."""
+    (folder / "page.html").write_text(page, encoding="utf-8")
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=9000", "--dump-dom",
+               "--enable-logging=stderr", f"--window-size={width},2000", f"--user-data-dir={folder / 'profile'}",
+               (folder / "page.html").as_uri()]  # fmt: skip
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    (seen,) = re.findall(r'<pre id="seen">(.*?)</pre>', ran.stdout, re.DOTALL) or ["{}"]
+    return (
+        ran.stdout,
+        json.loads(html.unescape(seen) or "{}"),
+        [one for one in ran.stderr.splitlines() if "CONSOLE" in one],
+    )
+
+
+def probed(page):
+    """The page with the probe, which its policy would stop."""
+    return re.sub(r"<meta http-equiv.*?>", "", page).replace("</body>", PROBE)
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+def test_a_browser_explores_the_page_as_written(page, tmp_path):
+    """Claim: under its own policy the page's figures appear, and the console has no error and no refused request."""
+    dom, _, console = opened(page("named"), tmp_path)
+    assert len(re.findall(r'<section[^>]* class="live"', dom)) == 2
+    assert len(re.findall(r'id="plot-\w+"><div class="bk-Column"', dom)) == 2
+    wrong = [one for one in console if re.search("error|refused|uncaught|violat", one, re.IGNORECASE)]
+    assert wrong == []
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+@pytest.mark.parametrize("width", [1400, 500])
+def test_channels_switch_and_nothing_is_cut_off(page, tmp_path, width):
+    """Claim: another channel has its own samples; at 1400 px no table is cut off; no page is wider than its window."""
+    _, seen, _ = opened(probed(page("named")), tmp_path, width)
+    overlay = diagnosis("named").overlays[0]
+    assert seen["live"] == 2 and seen["shown"] == 0
+    assert seen["before"][0] != seen["after"][0]
+    np.testing.assert_allclose(seen["after"][0], overlay.measured["u"][0], rtol=1e-6)
+    assert seen["after"][1] <= len(overlay.times) and seen["options"] == len(overlay.measured)
+    assert seen["wider"] <= 0
+    assert width < 1400 or seen["cut"] == 0
+
+
+def test_without_script_all_pictures_and_tables_are_there(page):
+    """Claim: the page's own text has every still picture, and hides the figures to explore."""
+    text = page("named")
+    assert text.count("<figure") == 6 and text.count("<img") == 6
+    assert text.count('<div class="explorer" hidden>') == 2
+    assert explorers(bare()) == {}
+    least = render(bare(), VEHICLE, {})
+    assert "script-src 'none'" in html.unescape(least) and "<script" not in least
+
+
+def test_the_page_is_at_most_three_megabytes(report):
+    """Claim: so is that of thirty long runs, of which as many can be chosen as there is room for."""
+    still = (report("named") / "report.html").stat().st_size
+    assert still <= 3_000_000
+    made = diagnosis("named", samples=3000)
+    many = [dataclasses.replace(made.overlays[0], run=f"run {i}") for i in range(30)]
+    forces = [dataclasses.replace(made.forces[0], run=f"run {i}") for i in range(30)]
+    of = explorers(dataclasses.replace(made, overlays=many, forces=forces))
+    longer = sum(len(one.data) for one in of.values()) - sum(len(one.data) for one in explorers(made).values())
+    assert still + longer <= 3_000_000
+    assert 5 <= len(of["residuals"].choices[0].options) < 30
+
+
+def test_no_name_ends_the_data_or_is_a_formula():
+    """Claim: a hostile channel is text of the data and of its option: no tag begins there, and no formula."""
+    evil = "</script><img src=x onerror=alert(1)> $$\\frac{1}{x}$$"
+    times = np.linspace(0.0, 9.0, 90)
+    shown = {evil: np.sin(times)}
+    made = dataclasses.replace(bare("unknown"), overlays=[Overlay(evil, times, shown, shown, {})])
+    found = explorers(made)
+    assert "<" not in found["residuals"].data
+    assert json.loads(found["residuals"].data)["target_id"] == "plot-residuals"
+    page = render(made, VEHICLE, {}, found)
+    outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert "<img" not in outside and html.escape(evil) in outside
+    assert '"name":"PlainText"' in found["residuals"].data.replace(" ", "")
+
+
+def test_the_script_is_one_that_may_stand_in_a_page():
+    assert "</script" not in script() and len(script()) < 1_400_000
