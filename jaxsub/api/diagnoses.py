@@ -12,6 +12,7 @@ from ..discrepancy.diagnosis import Coefficient, Location, Physics, Verdict
 from ..discrepancy.next_run import next_run, said
 from ..discrepancy.procedure import Keep
 from ..discrepancy.progress import Progress
+from ..discrepancy.stored import save_conclusions
 from ..effects import AbstractEffect
 from ..errors import InputError
 from ..estimate import require_free
@@ -215,12 +216,16 @@ class Diagnosis(AbstractResult):
         return pandas.DataFrame(rows, columns=list(columns))
 
     def write(self, folder: Path) -> None:
-        """Write `diagnosis.json`, `improved.toml`, `report.html`, `figures/` and `next_manoeuvre.csv` into `folder`."""
+        """Write `diagnosis.json`, `improved.toml`, `report.html`, `figures/` and `next_manoeuvre.csv` into `folder`.
+
+        `diagnosis.npz` beside them is what `jaxsub report` draws the page from again.
+        """
         from ..report import write_report
 
         text = self.write_numbers(folder)
         if self.next_run is not None:
             save(self.next_run, folder / NEXT_RUN)
+        save_conclusions(self.conclusions, folder / "diagnosis.npz")
         write_report(self.conclusions, text, folder)
 
     def write_numbers(self, folder: Path) -> str:

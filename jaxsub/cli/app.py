@@ -275,6 +275,16 @@ def sweep(out: Path, overwrite: bool, **arguments: Any) -> None:
 
 
 @app.command()
+@click.argument("folder", metavar="DIR", type=_PATH)
+@common
+def report(folder: Path) -> None:
+    """Draw the page and figures of a diagnosis in DIR again."""
+    from . import report as command
+
+    command.run(folder)
+
+
+@app.command()
 @click.argument("shell", type=click.Choice(SHELLS))
 @common
 def completion(shell: str) -> None:

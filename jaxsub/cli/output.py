@@ -135,6 +135,33 @@ def fresh_file(out: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> Itera
 
 
 @contextmanager
+def redrawn(folder: Path) -> Iterator[Path]:
+    """A folder to write files to, which take the places of those of the same name in `folder` once the block ends well.
+
+    All else in `folder` stays. **Raises** `InputError` where jaxsub did not write one that would be replaced, or it has
+    changed since, and where another process writes there; `OutputError` where writing fails.
+    """
+    manifest = Manifest.of_folder(folder)
+    with claimed(folder) as space:
+        new = space / "new"
+        new.mkdir()
+        with _told_of(new, folder):
+            yield new
+            placed = {path: folder / path.relative_to(new) for path in sorted(new.rglob("*")) if path.is_file()}
+            for there in placed.values():
+                if os.path.lexists(there) and not manifest.lists(there):
+                    what = "was not written by jaxsub or has changed since"
+                    raise InputError(str(there), what, "move it away and run again")
+            manifest.begin(_command())
+            for path, there in placed.items():
+                flush(path)
+                manifest.add(there, path)
+                there.parent.mkdir(exist_ok=True)
+                os.replace(path, there)
+    options().kept = f"{folder} is complete"
+
+
+@contextmanager
 def claimed(out: Path) -> Iterator[Path]:
     """A scratch folder beside `out`, which no other process may write while the block runs (`storage.scratch`).
 

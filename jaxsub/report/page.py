@@ -22,7 +22,7 @@ from .overlay import telling_overlay
 from .residual import located_device
 
 if TYPE_CHECKING:
-    from .explorers import Explorer
+    from .exploring import Explorer
 
 _VERDICTS = {
     "none": "no mismatch",
@@ -111,7 +111,7 @@ def _explorers(diagnosis: Conclusions) -> "dict[str, Explorer]":
 
 def _scripts() -> list[str]:
     """Bokeh's script, and the one that puts its figures into the page."""
-    from .explorers import script
+    from .exploring import script
 
     return [script(), (Path(__file__).parent / "explorers.js").read_text(encoding="utf-8")]
 

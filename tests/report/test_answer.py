@@ -48,6 +48,7 @@ def test_json_is_the_file_and_nothing_else(verdict, capsys, tmp_path):
         assert json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8")) == content
         assert {path.name for path in tmp_path.iterdir()} == {
             "diagnosis.json",
+            "diagnosis.npz",
             "improved.toml",
             "report.html",
             "figures",

@@ -15,7 +15,8 @@ from jaxsub.discrepancy.diagnosis import Overlay
 from jaxsub.report.page import render
 
 pytest.importorskip("bokeh")
-from jaxsub.report.explorers import explorers, script
+from jaxsub.report.explorers import explorers
+from jaxsub.report.exploring import script
 
 BROWSER = shutil.which("chromium")
 # what a reader would find: asked of the page once its figures are there

@@ -1,0 +1,144 @@
+"""What figures to explore are made of: a store of arrays, panels of Bokeh, and what of the store each panel shows.
+
+A figure's arrays lie in one store by name. A choice of a run or channel fills the names of what is shown, and
+`explorers.js` puts that into the figure.
+"""
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from bokeh.core.types import ID
+from bokeh.embed import json_item
+from bokeh.models import BoxAnnotation, ColumnDataSource, HoverTool, LayoutDOM, PlainText, Span
+from bokeh.plotting import figure
+from bokeh.resources import Resources
+from markupsafe import Markup
+
+from .drawing import GREY, PALE
+
+# float32 values of all arrays of a figure: a sixth of a page's 3 MB once they are text
+_MOST_VALUES = 90_000
+_LEAST, _MOST = 100, 2000  # points of one line
+_UNITS = {"time": "time (s)", "frequency": "frequency (Hz)", "lag": "lag (s)"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Choice:
+    """What a reader chooses: its `name` in patterns, the options as text, and the one that is shown first."""
+
+    name: str
+    options: list[str]
+    first: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Explorer:
+    """A figure with its choices. `data` is what `explorers.js` embeds, as JSON that may stand in a script element."""
+
+    name: str
+    choices: list[Choice]
+    data: Markup
+
+
+def script() -> str:
+    """Bokeh's script."""
+    return Resources(mode="inline", components=["bokeh"]).js_raw[0]
+
+
+class Drawing:
+    """A figure in the making: what is stored, and which property of which model shows what of it.
+
+    **Fields**
+
+    - `runs`: how many there is room for. `longest`: how many points a line may have.
+    """
+
+    def __init__(self, name: str, runs: int, arrays: int) -> None:
+        """For as many of `runs` as there is room for, each of so many `arrays`."""
+        self.name, self.runs = name, max(1, min(runs, _MOST_VALUES // (_LEAST * arrays)))
+        self.longest = int(np.clip(_MOST_VALUES // (self.runs * arrays), _LEAST, _MOST))
+        self.store: dict[str, Any] = {}
+        self.bindings: list[tuple[str, str, str | dict[str, str]]] = []
+
+    def keep(self, place: str, **values: np.ndarray | str | float) -> None:
+        """Store arrays, labels and numbers under `place/NAME`."""
+        for key, value in values.items():
+            # seconds since 1970 need more digits
+            kept = value.astype(float if key == "time" else np.float32) if isinstance(value, np.ndarray) else value
+            # plain, so that no name is read as a formula
+            self.store[f"{place}/{key}"] = PlainText(text=kept) if isinstance(kept, str) else kept
+
+    def source(self, name: str, columns: Mapping[str, str]) -> ColumnDataSource:
+        """A source whose columns follow patterns such as `{run}/{channel}/baseline`."""
+        self.bindings.append((name, "data", dict(columns)))
+        return ColumnDataSource(data={key: [] for key in columns}, name=name)
+
+    def panel(self, name: str, x: str, y: str | None, height: int, **settings: Any) -> Any:
+        """Axes with a label `x`, and the one `y`: a pattern, or fixed where it has no braces."""
+        drawn = figure(
+            name=name, height=height, sizing_mode="stretch_width", min_width=280, tools="pan,box_zoom,wheel_zoom,reset",
+            active_drag="box_zoom", active_scroll=None, toolbar_location="above", output_backend="canvas", **settings,
+        )  # fmt: skip
+        drawn.toolbar.logo = None
+        for axis, label in ((drawn.xaxis[0], x), (drawn.yaxis[0], y)):
+            axis.axis_label_text_font_style = "normal"
+            if label and "{" in label:
+                axis.name = f"{name}-{type(axis).__name__}-{label}"
+                self.bindings.append((axis.name, "axis_label", label))
+            elif label:
+                axis.axis_label = PlainText(text=label)
+        drawn.add_layout(Span(location=0.0, dimension="width", line_color=GREY, line_width=0.7))
+        return drawn
+
+    def band(self, panel: Any, low: str, high: str) -> None:
+        """A grey band between two stored numbers."""
+        box = BoxAnnotation(
+            fill_color=PALE, fill_alpha=0.6, line_color=None, level="underlay", name=f"{panel.name}-band"
+        )
+        panel.add_layout(box)
+        self.bindings += [(str(box.name), "bottom", low), (str(box.name), "top", high)]
+
+    def finished(self, choices: Sequence[Choice], layout: LayoutDOM) -> Explorer:
+        """The explorer of a layout of panels, which shows the first options."""
+        chosen = {choice.name: choice.first for choice in choices}
+        at = lambda pattern: self.store.get(pattern.format(**chosen))
+        for name, key, pattern in self.bindings:
+            model = layout.select_one({"name": name})
+            value = at(pattern) if isinstance(pattern, str) else _padded({c: at(one) for c, one in pattern.items()})
+            setattr(model, key, value)
+        layout.tags = [self.store, [list(binding) for binding in self.bindings]]
+        text = json.dumps(json_item(layout, ID(f"plot-{self.name}"))).replace("<", "\\u003c")
+        return Explorer(self.name, list(choices), Markup(text))
+
+
+def _padded(columns: Mapping[str, np.ndarray | None]) -> dict[str, np.ndarray]:
+    """Columns of one length: what is not there is missing at every place."""
+    length = max((len(values) for values in columns.values() if values is not None), default=0)
+    missing = np.full(length, np.nan, np.float32)
+    return {name: missing if values is None else values for name, values in columns.items()}
+
+
+def lines(panel: Any, source: ColumnDataSource, x: str, columns: Mapping[str, str], dots: Sequence[str] = ()) -> None:
+    """Each of `columns` with its colour over `x`, as a line or as `dots`, and values under the pointer."""
+    for name, color in columns.items():
+        label = name.replace("_", " ")
+        if name in dots:
+            drawn = panel.scatter(x, name, source=source, size=3.5, color=color, alpha=0.6, legend_label=label)
+        else:
+            drawn = panel.line(x, name, source=source, color=color, line_width=1.6, legend_label=label)
+    values = [(name.replace("_", " "), f"@{name}{{%.4g}}") for name in columns]
+    formatters: dict[str, Any] = {f"@{name}": "printf" for name in (x, *columns)}
+    mode = "mouse" if dots and len(dots) == len(columns) else "vline"
+    hover = HoverTool(
+        renderers=[drawn], tooltips=[(_UNITS.get(x, x), f"@{x}{{%.4g}}"), *values], formatters=formatters, mode=mode
+    )
+    panel.add_tools(hover)
+    panel.legend.click_policy = "hide"
+    panel.legend.orientation = "horizontal"
+    panel.legend.location = "left"
+    panel.legend.margin = panel.legend.padding = 0
+    panel.legend.border_line_color = None
+    panel.add_layout(panel.legend[0], "below")
