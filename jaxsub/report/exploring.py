@@ -19,8 +19,8 @@ from markupsafe import Markup
 
 from .drawing import GREY, PALE
 
-# float32 values of all arrays of a figure: a sixth of a page's 3 MB once they are text
-_MOST_VALUES = 90_000
+# float32 values of all arrays of a figure: an eighth of a page's 3 MB once they are text
+_MOST_VALUES = 70_000
 _LEAST, _MOST = 100, 2000  # points of one line
 _UNITS = {"time": "time (s)", "frequency": "frequency (Hz)", "lag": "lag (s)"}
 
