@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.layouts import column, row
 
 from ..discrepancy.diagnosis import Conclusions, ForceTrace, Overlay
 from .by_state import state_unit
@@ -26,6 +25,8 @@ def explorers(diagnosis: Conclusions) -> dict[str, Explorer]:
 
 def _residuals(diagnosis: Conclusions) -> Explorer | None:
     """A channel of a test run, measured and modelled: its residual, and the residual's spectrum and autocorrelation."""
+    from bokeh.layouts import column, row
+
     overlays = [overlay for overlay in diagnosis.overlays if overlay.measured]
     telling = telling_overlay(diagnosis)
     if telling is None:
@@ -91,6 +92,8 @@ def _keep_residual(made: Drawing, place: str, overlay: Overlay, channel: str, mo
 
 def _forces(diagnosis: Conclusions) -> Explorer | None:
     """The force that the model lacks in an equation over time, and the added effects' force over a state."""
+    from bokeh.layouts import column
+
     telling = telling_trace(diagnosis)
     if telling is None:
         return None

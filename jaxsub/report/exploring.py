@@ -7,17 +7,16 @@ A figure's arrays lie in one store by name. A choice of a run or channel fills t
 import dataclasses
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from bokeh.core.types import ID
-from bokeh.embed import json_item
-from bokeh.models import BoxAnnotation, ColumnDataSource, HoverTool, LayoutDOM, PlainText, Span
-from bokeh.plotting import figure
-from bokeh.resources import Resources
 from markupsafe import Markup
 
 from .drawing import GREY, PALE
+
+# Bokeh takes two seconds to import, and is imported by what draws with it
+if TYPE_CHECKING:
+    from bokeh.models import ColumnDataSource, LayoutDOM
 
 # float32 values of all arrays of a figure: an eighth of a page's 3 MB once they are text
 _MOST_VALUES = 70_000
@@ -45,6 +44,8 @@ class Explorer:
 
 def script() -> str:
     """Bokeh's script."""
+    from bokeh.resources import Resources
+
     return Resources(mode="inline", components=["bokeh"]).js_raw[0]
 
 
@@ -65,19 +66,26 @@ class Drawing:
 
     def keep(self, place: str, **values: np.ndarray | str | float) -> None:
         """Store arrays, labels and numbers under `place/NAME`."""
+        from bokeh.models import PlainText
+
         for key, value in values.items():
             # seconds since 1970 need more digits
             kept = value.astype(float if key == "time" else np.float32) if isinstance(value, np.ndarray) else value
             # plain, so that no name is read as a formula
             self.store[f"{place}/{key}"] = PlainText(text=kept) if isinstance(kept, str) else kept
 
-    def source(self, name: str, columns: Mapping[str, str]) -> ColumnDataSource:
+    def source(self, name: str, columns: Mapping[str, str]) -> "ColumnDataSource":
         """A source whose columns follow patterns such as `{run}/{channel}/baseline`."""
+        from bokeh.models import ColumnDataSource
+
         self.bindings.append((name, "data", dict(columns)))
         return ColumnDataSource(data={key: [] for key in columns}, name=name)
 
     def panel(self, name: str, x: str, y: str | None, height: int, **settings: Any) -> Any:
         """Axes with a label `x`, and the one `y`: a pattern, or fixed where it has no braces."""
+        from bokeh.models import PlainText, Span
+        from bokeh.plotting import figure
+
         drawn = figure(
             name=name, height=height, sizing_mode="stretch_width", min_width=280, tools="pan,box_zoom,wheel_zoom,reset",
             active_drag="box_zoom", active_scroll=None, toolbar_location="above", output_backend="canvas", **settings,
@@ -95,14 +103,19 @@ class Drawing:
 
     def band(self, panel: Any, low: str, high: str) -> None:
         """A grey band between two stored numbers."""
+        from bokeh.models import BoxAnnotation
+
         box = BoxAnnotation(
             fill_color=PALE, fill_alpha=0.6, line_color=None, level="underlay", name=f"{panel.name}-band"
         )
         panel.add_layout(box)
         self.bindings += [(str(box.name), "bottom", low), (str(box.name), "top", high)]
 
-    def finished(self, choices: Sequence[Choice], layout: LayoutDOM) -> Explorer:
+    def finished(self, choices: Sequence[Choice], layout: "LayoutDOM") -> Explorer:
         """The explorer of a layout of panels, which shows the first options."""
+        from bokeh.core.types import ID
+        from bokeh.embed import json_item
+
         chosen = {choice.name: choice.first for choice in choices}
         at = lambda pattern: self.store.get(pattern.format(**chosen))
         for name, key, pattern in self.bindings:
@@ -121,8 +134,10 @@ def _padded(columns: Mapping[str, np.ndarray | None]) -> dict[str, np.ndarray]:
     return {name: missing if values is None else values for name, values in columns.items()}
 
 
-def lines(panel: Any, source: ColumnDataSource, x: str, columns: Mapping[str, str], dots: Sequence[str] = ()) -> None:
+def lines(panel: Any, source: "ColumnDataSource", x: str, columns: Mapping[str, str], dots: Sequence[str] = ()) -> None:
     """Each of `columns` with its colour over `x`, as a line or as `dots`, and values under the pointer."""
+    from bokeh.models import HoverTool
+
     for name, color in columns.items():
         label = name.replace("_", " ")
         if name in dots:
