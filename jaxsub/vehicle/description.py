@@ -52,4 +52,4 @@ def _limits(row: Parameter) -> str:
     bounded = math.isfinite(row.lower) or math.isfinite(row.upper)
     within = f", within {row.lower:.6g} to {row.upper:.6g}" if bounded else ""
     known = f", prior {row.prior_mean:.6g} ± {row.prior_std:.2g}" if math.isfinite(row.prior_std) else ""
-    return within + known
+    return within + known + (", differs by run" if row.varies else "")

@@ -95,6 +95,9 @@ def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Para
             raise unknown_key(f"{place}.{key}", _NUMBER_KEYS, key)
     if "value" not in table.data:
         raise InputError(place, "has no value", "write { value = … }")
+    if isinstance(table.data["value"], str) and len(table.data) > 1:
+        remedy = "write the expression alone; bounds, prior and varies are for the numbers that it follows"
+        raise InputError(place, "has an expression beside other keys", remedy)
     value = read_finite(table.data["value"], place)
     low, high = _bounds(table.data.get("bounds", [default.lower, default.upper]), place)
     if not low <= value <= high:

@@ -119,6 +119,7 @@ def test_it_is_written_as_it_is_read():
     assert np.isnan(float(again.spreads["buoyancy"])) and float(again.spreads["Z_w"]) == 0.5
     found = vehicle.with_spreads({"buoyancy": 1.25})
     assert float(vehicle_from(tomllib.loads(vehicle_text(found)), "x").spreads["buoyancy"]) == 1.25
+    assert "buoyancy = 590 N, differs by run" in repr(vehicle)
     assert vehicle.at_mean.layout.states == hull({}).layout.states and not vehicle.at_mean.spreads
 
 
@@ -128,6 +129,9 @@ REFUSED = {
     "buoyancy.spread: is -1; give a positive number": {"body.buoyancy": {"varies": "run", "spread": -1.0}},
     "buoyancy: is fixed and differs by run; delete fixed, or varies": {"body.buoyancy": BY_RUN | {"fixed": True}},
     "Z_w: value -90 lies outside its bounds": {"coefficients.Z_w": {"bounds": [-10.0, 0.0]}},
+    "Z_w: has an expression beside other keys; write the expression alone": {
+        "coefficients.Z_w": BY_RUN | {"value": "-N_r"}
+    },
     "Z_w.prior_std: is -2; give a positive number": {"coefficients.Z_w": {"prior_std": -2}},
 }
 
