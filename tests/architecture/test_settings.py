@@ -36,6 +36,7 @@ ALLOWED = {
         "manoeuvre.py": {"_WIDER", "_LEAST", "_PARTS"}, "next_run.py": {"_LONGEST"},
         "separation.py": {"_PENALTY", "_MARGIN", "_SHARP", "_NONE", "_UNTOLD"},
     },
+    "is the version of a file": {"stored.py": {"_SCHEMA"}},
     "is a limit of the process": {"programs.py": {"_MANY"}},
     "is what is said where nothing was tested": {"verdict.py": {"NOTHING"}, "whiteness.py": {"RANDOM"}},
 }  # fmt: skip
