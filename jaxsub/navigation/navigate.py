@@ -12,7 +12,6 @@ from jaxtyping import Array, Bool, Float
 from ..errors import InputError
 from ..filter import (
     AbstractFilter,
-    Estimate,
     ExtendedKalmanFilter,
     FilterState,
     Sample,
@@ -23,9 +22,8 @@ from ..filter import (
 from ..findings import Finding
 from ..programs import compiled
 from .field import FieldFit, with_field
-from .rotation import turned
 from .rows import Rows, padded, rows_of
-from .start import Start, start_of
+from .start import WIDER, Start, start_of
 from .suite import SensorSuite
 from .suite.log import SensorLog
 from .suite_filter import filter_of
@@ -33,11 +31,9 @@ from .track import Shown, Track
 
 # rows of a block: what is compiled once, and what the smoother does again
 _BLOCK = 2048
-# s by which a start in motion is found, how often it is smoothed, and headings tried where none is measured: a filter
-# that begins with a wrong attitude linearises about it, and is too sure of the yaw and the delays that it then finds
-_ALIGNING, _ROUNDS, _HEADINGS = 20.0, 3, 8
-# times the deviations found, with which a run begins after that: nine tenths of what it finds are of its own
-_WIDER = 3.0
+# s by which a start in motion is found, and how often it is smoothed: a filter that begins with a wrong attitude
+# linearises about it, and is too sure of the yaw and the delays that it then finds
+_ALIGNING, _ROUNDS = 20.0, 3
 
 Told = Callable[[float, float], object]
 
@@ -88,10 +84,8 @@ def navigate(log: SensorLog, suite: SensorSuite, told: Told = lambda done, of: N
     arm = jnp.asarray(suite.only("accelerometer").lever_arm)
     x = np.concatenate([start.x, np.zeros(len(late))])
     K, early = len(rows.times), int(np.searchsorted(rows.times, rows.times[0] + _ALIGNING, side="right"))
-    rounds = 0 if start.rest and start.heading != "unknown" else _ROUNDS
+    rounds = 0 if start.rest or start.heading == "by fixes" else _ROUNDS
     steps = _Steps(told, _cost(K) * (2 if late else 1) + rounds * _cost(early))
-    if start.heading == "unknown":
-        x = _likeliest(filter, x, rows, early)
     begin = filter.start(jnp.asarray(x), jnp.zeros(0), jnp.zeros((0, 0)))
     for _ in range(rounds):
         begin = _aligned(filter, _passes(filter, begin, rows, early, arm, steps).first)
@@ -159,7 +153,7 @@ def _passes(
 def _aligned(filter: ExtendedKalmanFilter, first: Smoothed) -> FilterState:
     """A start at what the first seconds say of it, of which a tenth is then counted twice."""
     state = filter.start(first.x, jnp.zeros(0), jnp.zeros((0, 0)))
-    root = jnp.linalg.cholesky(_WIDER**2 * first.covariance)
+    root = jnp.linalg.cholesky(WIDER**2 * first.covariance)
     return dataclasses.replace(state, joint=filter.form.start(root))
 
 
@@ -193,35 +187,3 @@ def _forward(
         return state, _Seen(track, estimate.innovation / estimate.innovation_std, estimate.used)
 
     return jax.lax.scan(step, state, samples)
-
-
-@compiled
-def _likelihoods(filter: AbstractFilter, starts: Float[Array, "h n"], samples: Sample) -> Float[Array, " h"]:
-    """Log likelihood of the samples from each of the starts."""
-
-    def of(x: Array) -> Array:
-        def step(carry: tuple[FilterState, Array], sample: Sample) -> tuple[tuple[FilterState, Array], None]:
-            state, total = carry
-            state, estimate = filter.step(state, sample)
-            return (state, total + _log_likelihood(estimate)), None
-
-        begun = filter.start(x, jnp.zeros(0), jnp.zeros((0, 0)))
-        return jax.lax.scan(step, (begun, jnp.zeros(())), samples)[0][1]
-
-    return jax.vmap(of)(starts)
-
-
-def _log_likelihood(estimate: Estimate) -> Float[Array, ""]:
-    whitened = jax.scipy.linalg.solve_triangular(estimate.factor, estimate.innovation, lower=True)
-    found = -0.5 * whitened @ whitened - jnp.sum(jnp.log(jnp.abs(jnp.diag(estimate.factor))))
-    return jnp.where(estimate.diverged, -jnp.inf, jnp.where(jnp.any(estimate.used), found, 0.0))
-
-
-def _likeliest(filter: ExtendedKalmanFilter, x: np.ndarray, rows: Rows, K: int) -> np.ndarray:
-    """The start among eight headings that makes the first K rows most likely."""
-    headings = 2.0 * jnp.pi * jnp.arange(_HEADINGS) / _HEADINGS
-    attitudes = jax.vmap(turned, (None, 0))(jnp.asarray(x[:4]), headings)
-    starts = np.concatenate([attitudes, np.tile(x[4:], (_HEADINGS, 1))], axis=1)
-    samples = padded(rows.samples, 0, K, _BLOCK * -(-K // _BLOCK))
-    found = np.asarray(_likelihoods(filter, jnp.asarray(starts), samples))
-    return starts[int(np.argmax(np.where(np.isfinite(found), found, -np.inf)))]

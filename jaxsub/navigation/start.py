@@ -9,7 +9,8 @@ import numpy as np
 from ..effects import GRAVITY
 from .aided import SCALES
 from .alignment import MagneticField, aligned
-from .rotation import turned
+from .fix_alignment import aligned_by_fixes
+from .rotation import UNKNOWN, turned
 from .suite import SensorSuite
 from .suite.log import SensorLog, interpolated
 
@@ -19,6 +20,8 @@ _NEAR_GRAVITY = 0.5
 # standard deviations at rest: tilt, heading by a field, velocity; in motion: tilt, velocity
 _REST = (0.02, 0.05, 0.1)
 _MOVING = (0.3, 5.0)
+# times the deviations found from a run's first seconds, with which the run begins
+WIDER = 3.0
 # share of the field by which it differs from place to place
 FIELD_SPREAD = 0.03
 
@@ -29,7 +32,7 @@ class Start(NamedTuple):
     **Fields**
 
     - `x`: (19,) state without delays. `std`: (18,) of its changes. `rest`: whether the unit is still at first.
-    - `heading`: `measured`, `unknown` (fixes may show it) or `relative` (nothing will: it counts from the start).
+    - `heading`: `measured`, `by fixes`, `unknown` (fixes do not show it) or `relative` (it counts from the start).
     """
 
     x: np.ndarray
@@ -53,7 +56,7 @@ def field_of(log: SensorLog, suite: SensorSuite) -> MagneticField | None:
 
 
 def start_of(log: SensorLog, suite: SensorSuite) -> Start:
-    """The start of a log: levelled by its first second, with the heading of a field or a compass where there is one."""
+    """The start of a log: levelled by its first second, with the heading of a field, of a compass or of fixes."""
     gyro, accelerometer = suite.only("gyro"), suite.only("accelerometer")
     rates, forces = _early(log, gyro.name), _early(log, accelerometer.name)
     force = forces.mean(axis=0) if len(forces) else log.complete(accelerometer.name)[1][0]
@@ -70,9 +73,19 @@ def start_of(log: SensorLog, suite: SensorSuite) -> Start:
     if rest:
         # what it shows at rest is bias, but for its noise and Earth's rate
         bias, bias_std = rates.mean(axis=0), min(bias_std, gyro.noise.density / math.sqrt(_WINDOW) + 7.3e-5)
-    x = np.concatenate([q, velocity, position, bias, np.zeros(3), np.zeros(SCALES)])
+    by_fixes = None
+    if heading == "unknown":
+        by_fixes = aligned_by_fixes(log, suite, q, bias, bias_std, *([tilt] if rest else []))
+    offset = np.zeros(3)
     std = np.repeat([tilt, slow, place, bias_std, accelerometer.noise.bias, max(gyro.noise.scale_error, 1e-6)], 3)
     std[2] = turn
+    if by_fixes is not None:
+        q, velocity, bias, offset = by_fixes.q, by_fixes.velocity, by_fixes.gyro_bias, by_fixes.accelerometer_bias
+        heading = "by fixes" if by_fixes.shows_heading else "unknown"
+        # the filter is given the same fixes again: wider, nine tenths of what it finds are of its own
+        std[[0, 1, 2, *range(9, 15)]] = WIDER * by_fixes.std
+        std[:3] = np.minimum(std[:3], UNKNOWN)
+    x = np.concatenate([q, velocity, position, bias, offset, np.zeros(SCALES)])
     return Start(x, std, rest, heading)
 
 

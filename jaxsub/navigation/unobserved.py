@@ -41,7 +41,7 @@ def _of_heading(found: Navigation) -> list[str]:
     median = float(np.median(std))
     if median > _UNSURE:
         moving = "turning or accelerating while fixes are taken would show it"
-        remedy = moving if found.start.heading == "unknown" else "a calibrated compass would show it"
+        remedy = moving if found.start.heading in ("unknown", "by fixes") else "a calibrated compass would show it"
         return [f"Yaw is uncertain by {math.degrees(median):.2g}° (1 σ, median): {remedy}."]
     return []
 

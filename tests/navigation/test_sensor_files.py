@@ -95,7 +95,10 @@ def readings(text, columns, units=()):
 
 def test_fixes_are_metres_north_and_east_of_the_first():
     """Claim: 10⁻⁵ rad of latitude and longitude at 45° are 63.7 m and 45.2 m, and altitude is minus z."""
-    text = "[sensors.gps]\ncolumn = ['lat', 'lon', 'alt']\nunit = ['deg', 'deg', 'm']\n"
+    text = (
+        "[sensors.gps]\ncolumn = ['lat', 'lon', 'alt']\nchannel = ['latitude', 'longitude', 'altitude']\n"
+        "unit = ['deg', 'deg', 'm']\n"
+    )
     lat, lon = (np.degrees(start + 1e-5 * np.arange(3.0)) for start in (np.pi / 4.0, 0.2))
     log = readings(text, {"lat": lat, "lon": lon, "alt": np.array([0.0, 5.0, 10.0])})
     np.testing.assert_allclose(log.readings["gps"][1], [63.67, 45.18, -5.0], atol=0.05)

@@ -89,9 +89,12 @@ def _fits(kind: str, unit: str) -> bool:
 def _table(kind: str, columns: tuple[str, ...], units: dict[str, str]) -> list[str]:
     """The lines of a sensor's table."""
     known = KINDS[kind]
-    first = next(channels for channels in known.channels if len(channels) == len(columns))[0]
+    fitting = [channels for channels in known.channels if len(channels) == len(columns)]
+    first = fitting[0][0]
     listed = ", ".join(map(_quoted, columns))
     lines = ["", f"[sensors.{kind}]", f"column = {f'[{listed}]' if len(columns) > 1 else listed}"]
+    if len(fitting) > 1:
+        lines.append(f"channel = [{', '.join(map(_quoted, fitting[0]))}]")
     if not any(units[column] for column in columns):
         lines.append(f'unit = "{known.units[first]}"'.ljust(37) + "# the log states none")
     if known.frames:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -92,19 +92,26 @@ def _columns(table: Table) -> tuple[str, ...]:
 
 def _channels(table: Table, known: Kind, count: int) -> tuple[str, ...]:
     if "channel" not in table.data:
-        for channels in known.channels:
-            if len(channels) == count:
-                return channels
+        fitting = [channels for channels in known.channels if len(channels) == count]
+        if len(fitting) == 1:
+            return fitting[0]
+        if fitting:
+            # degrees that are read as metres, or metres as radians, are numbers as good as any
+            what = f"is missing, and {count} columns may be {_listed(fitting)}"
+            raise InputError(table.place("channel"), what, "write which of them")
         wanted = " or ".join(str(len(channels)) for channels in {len(c): c for c in known.channels}.values())
         raise InputError(table.place("column"), f"has {count} entries", f"give {wanted}")
     word = table.data["channel"]
     channels = (word,) if isinstance(word, str) else table.names("channel") or ()
     if channels not in known.channels:
-        listed = " or ".join(f"[{', '.join(channels)}]" for channels in known.channels)
-        raise InputError(table.place("channel"), f"is {word!r:.60}", f"give {listed}")
+        raise InputError(table.place("channel"), f"is {word!r:.60}", f"give {_listed(known.channels)}")
     if len(channels) != count:
         raise InputError(table.place("column"), f"has {count} entries", f"give {len(channels)}, one for each channel")
     return channels
+
+
+def _listed(choices: Sequence[tuple[str, ...]]) -> str:
+    return " or ".join(f"[{', '.join(channels)}]" for channels in choices)
 
 
 def _units(table: Table, known: Kind, channels: tuple[str, ...]) -> tuple[str, ...]:

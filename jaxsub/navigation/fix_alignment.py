@@ -1,0 +1,225 @@
+r"""Attitude in motion by fixes alone: they show how the vehicle accelerates over ground, the sensors how in its axes.
+
+With $R(t)$ the attitude relative to the start, by the gyros, fixes of position follow
+
+$$p(t) = p_0 + v_0 t + \tfrac12 g t^2 + C \left(\iint R\,(f - b_a)\,dt^2 + R(t)\,l\right),$$
+
+whose unknowns are the attitude C at the start, $p_0$, $v_0$ and the biases of accelerometer and gyro. R depends on the
+latter. Fixes of velocity follow the same, integrated once. The unknowns are found by least squares, over a window that
+is doubled until it shows the heading. Source: Wu and Pan (2013), Velocity/position integration formula, part I, IEEE
+Transactions on Aerospace and Electronic Systems 49 (2); biases are added.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from ..effects import GRAVITY
+from .suite import Sensor, SensorSuite
+from .suite.log import SensorLog, interpolated
+
+# s of the first window, and rad to which a heading is known: a filter may linearise about an attitude so far off
+_WINDOW, _KNOWN = 5.0, 0.15
+# s between the attitudes of the integral
+_STEP = 0.05
+# rad about each axis from which the search begins: any
+_ANY = 3.0
+_LEAST_FIXES = 4
+
+
+class FixAlignment(NamedTuple):
+    """What fixes say of a start in motion.
+
+    **Fields**
+
+    - `q`: (4,) attitude; `velocity`: (3,) m/s, NED. `gyro_bias`: (3,) rad/s; `accelerometer_bias`: (3,) m/s².
+    - `std`: (9,) standard deviations of the attitude about north, east and down, rad, and of both biases.
+    """
+
+    q: np.ndarray
+    velocity: np.ndarray
+    gyro_bias: np.ndarray
+    accelerometer_bias: np.ndarray
+    std: np.ndarray
+
+    @property
+    def shows_heading(self) -> bool:
+        """Whether the heading is known well enough for a filter to begin with it."""
+        return bool(self.std[2] < _KNOWN)
+
+
+def aligned_by_fixes(
+    log: SensorLog,
+    suite: SensorSuite,
+    q: np.ndarray,
+    gyro_bias: np.ndarray,
+    gyro_bias_std: float,
+    tilt_std: float = _ANY,
+) -> FixAlignment | None:
+    """The start that explains a log's fixes over a window that shows the heading, or over all of it.
+
+    `q` (4,) is an attitude whose tilt is known to `tilt_std` rad, if at all, and `gyro_bias` (3,) rad/s is known to
+    `gyro_bias_std`. None for a log without a sensor that has four fixes.
+    """
+    noise = suite.only("accelerometer").noise
+    assert noise is not None
+    fixes = [_Fixes.of(log, suite, sensor) for sensor in suite.of("gps", "usbl", "velocity")]
+    least = max((one.times[_LEAST_FIXES - 1] for one in fixes if len(one.times) >= _LEAST_FIXES), default=np.inf)
+    if not np.isfinite(least):
+        return None
+    motion, end, first = _Motion.of(log, suite), log.times[-1], log.times[0]
+    prior = (
+        np.concatenate([np.zeros(3), gyro_bias, np.zeros(3)]),
+        np.concatenate([[tilt_std, tilt_std, _ANY], np.repeat([gyro_bias_std, noise.bias], 3)]),
+    )
+    x, level = prior[0], Rotation.from_quat(np.roll(q, -1))
+    about, length = None, _WINDOW
+    while True:
+        until = first + length
+        if until >= min(least, end):
+            part, seen = motion.until(until), [one.until(until) for one in fixes]
+            about = _headed(part, seen, level, x) if about is None else about
+            x, std = _fitted(part, seen, about, x, *prior)
+            if std[2] < _KNOWN or until >= end:
+                break
+        length *= 2.0
+    attitude = Rotation.from_rotvec(x[:3]) * about
+    return FixAlignment(np.roll(attitude.as_quat(), 1), _velocity(part, seen[0], attitude, x), x[3:6], x[6:], std)
+
+
+class _Motion(NamedTuple):
+    """Integrals of the sensors' readings between times: `times` (k + 1,) s, `turns` (k, 3) rad, `gains` (k, 3) m/s."""
+
+    times: np.ndarray
+    turns: np.ndarray
+    gains: np.ndarray
+
+    @classmethod
+    def of(cls, log: SensorLog, suite: SensorSuite) -> "_Motion":
+        grid = np.arange(log.times[0], log.times[-1] + _STEP, _STEP)
+        between = lambda times, values: np.diff(
+            interpolated(grid, times, cumulative_trapezoid(values, times, axis=0, initial=0.0)), axis=0
+        )
+        return cls(grid, *(between(*log.complete(suite.only(kind).name)) for kind in ("gyro", "accelerometer")))
+
+    def until(self, time: float) -> "_Motion":
+        """The part that ends at or after a time."""
+        k = int(np.searchsorted(self.times, time))
+        return _Motion(self.times[: k + 1], self.turns[:k], self.gains[:k])
+
+    def integrated(self, gyro_bias: np.ndarray, accelerometer_bias: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Attitudes (k + 1, 3, 3), velocities and positions (k + 1, 3) without gravity, in the axes of the start."""
+        dt = np.diff(self.times)[:, None]
+        turns = self.turns - gyro_bias * dt
+        R = np.concatenate([np.eye(3)[None], _products(Rotation.from_rotvec(turns).as_matrix())])
+        middle = R[:-1] @ Rotation.from_rotvec(0.5 * turns).as_matrix()
+        gains = np.einsum("kij,kj->ki", middle, self.gains - accelerometer_bias * dt)
+        velocity = np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
+        return R, velocity, cumulative_trapezoid(velocity, self.times, axis=0, initial=0.0)
+
+
+def _products(factors: np.ndarray) -> np.ndarray:
+    """(k, 3, 3) products of the first, the first two, ... factors, in log k passes (Hillis and Steele, 1986)."""
+    found, shift = factors, 1
+    while shift < len(found):
+        found = np.concatenate([found[:shift], found[:-shift] @ found[shift:]])
+        shift *= 2
+    return found
+
+
+class _Fixes(NamedTuple):
+    """Fixes of one sensor.
+
+    `times` (m,) s, `values` (m, a) and `sigma` (a,) of the first a axes; `arm` (3,) m from the accelerometer;
+    `integrals`: of the acceleration, 2 for a position and 1 for a velocity.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    sigma: np.ndarray
+    arm: np.ndarray
+    integrals: int
+
+    @classmethod
+    def of(cls, log: SensorLog, suite: SensorSuite, sensor: Sensor) -> "_Fixes":
+        times, values = log.complete(sensor.name)
+        arm = np.subtract(sensor.lever_arm, suite.only("accelerometer").lever_arm)
+        inside = times >= log.times[0] + sensor.delay
+        integrals = 1 if sensor.kind == "velocity" else 2
+        return cls(times[inside] - sensor.delay, values[inside], np.asarray(sensor.sigma), arm, integrals)
+
+    def until(self, time: float) -> "_Fixes":
+        """Those up to a time."""
+        return self._replace(times=self.times[self.times <= time], values=self.values[self.times <= time])
+
+    def apart_from_gravity(self, start: float) -> np.ndarray:
+        """(m, a) fixes without what gravity adds to them from the `start` on."""
+        fallen = GRAVITY * (self.times - start) ** self.integrals / self.integrals
+        return self.values - fallen[:, None] * np.array([0.0, 0.0, 1.0])[: self.values.shape[1]]
+
+    def by_sensors(self, motion: _Motion, x: np.ndarray) -> np.ndarray:
+        """(m, 3) what the inertial sensors show in place of them, in the axes of the start."""
+        R, velocity, position = motion.integrated(x[3:6], x[6:])
+        moved = position + R @ self.arm if self.integrals == 2 else velocity
+        return interpolated(self.times, motion.times, moved)
+
+    def powers(self, start: float) -> np.ndarray:
+        """(m, n) powers of time that the unknown first position and velocity add."""
+        return np.vander(self.times - start, self.integrals, increasing=True)
+
+    def without_start(self, values: np.ndarray, start: float) -> np.ndarray:
+        """`values` (m, n) less what the first position and velocity could add to them."""
+        Q, _ = np.linalg.qr(self.powers(start))
+        return values - Q @ (Q.T @ values)
+
+
+def _headed(motion: _Motion, fixes: Sequence[_Fixes], level: Rotation, x: np.ndarray) -> Rotation:
+    """The level attitude turned about the vertical to the heading that explains the fixes best, in closed form."""
+    along = across = 0.0
+    for one in fixes:
+        start = motion.times[0]
+        seen = one.without_start(one.apart_from_gravity(start), start)
+        shown = level.apply(one.without_start(one.by_sensors(motion, x), start))
+        along += float(np.sum(seen[:, :2] * shown[:, :2]))
+        across += float(np.sum(seen[:, 1] * shown[:, 0] - seen[:, 0] * shown[:, 1]))
+    return Rotation.from_rotvec([0.0, 0.0, np.arctan2(across, along)]) * level
+
+
+def _fitted(
+    motion: _Motion, fixes: Sequence[_Fixes], about: Rotation, x: np.ndarray, mean: np.ndarray, std: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The turn from `about` and the biases, (9,), that explain the fixes beside their prior, and their deviations."""
+    start = motion.times[0]
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        attitude, found = Rotation.from_rotvec(x[:3]) * about, [(x - mean) / std]
+        for one in fixes:
+            shown = attitude.apply(one.by_sensors(motion, x))[:, : one.values.shape[1]]
+            rest = one.without_start(one.apart_from_gravity(start) - shown, start)
+            found.append((rest / one.sigma).ravel())
+        return np.concatenate(found)
+
+    found = least_squares(residuals, x, x_scale=std)
+    covariance = np.linalg.inv(found.jac.T @ found.jac)
+    moved = np.eye(9)
+    moved[:3, :3] = _turns_of_vector(found.x[:3])
+    return found.x, np.sqrt(np.diag(moved @ covariance @ moved.T))
+
+
+def _turns_of_vector(v: np.ndarray) -> np.ndarray:
+    """(3, 3) small turns about north, east and down by changes of a rotation vector `v`, which may be large itself."""
+    step = 1e-6
+    changed = Rotation.from_rotvec(v + step * np.eye(3)) * Rotation.from_rotvec(v).inv()
+    return changed.as_rotvec().T / step
+
+
+def _velocity(motion: _Motion, fixes: _Fixes, attitude: Rotation, x: np.ndarray) -> np.ndarray:
+    """(3,) the velocity at the start, m/s; zero in axes without fixes."""
+    start, axes = motion.times[0], fixes.values.shape[1]
+    rest = fixes.apart_from_gravity(start) - attitude.apply(fixes.by_sensors(motion, x))[:, :axes]
+    found = np.linalg.lstsq(fixes.powers(start), rest)[0][-1]
+    return np.concatenate([found, np.zeros(3 - axes)])
