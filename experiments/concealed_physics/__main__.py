@@ -1,9 +1,9 @@
-"""`python -m experiments.concealed_physics --out DIR [--quick] [--part CONDITION] [--count N] [--skip N] [--jobs N]`.
+"""`python -m experiments.concealed_physics --out DIR [--quick | --fresh] [--part CONDITION] [--count N] [--jobs N]`.
 
 Every case is a set of files that conceal physics, and the answer of `jaxsub diagnose`, which sees only them.
 `DIR/cases.jsonl` holds a line for each case that is done; an interrupted run goes on where it stopped, and
 `results.json` and the figures are drawn from all of its lines. Cases are ordered so that at any time every condition
-has been done in proportion. `--skip` leaves out the first of that order: what the engine was mended on proves less.
+has been done in proportion. `--fresh` does cases beyond the plan instead, on which no engine was ever corrected.
 """
 
 import argparse
@@ -13,9 +13,9 @@ from pathlib import Path
 from jaxsub.cli import terminal
 
 from ..cases import completed
-from .assemble import assemble, is_right
+from .assemble import is_right, sets
 from .figures import draw
-from .plan import COUNTS, ordered
+from .plan import COUNTS, FRESH, ordered
 from .work import work
 
 # a process may hold so many compiled programs and no more
@@ -26,18 +26,22 @@ def main() -> None:
     """Do the cases that are missing, and assemble what all lines say."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--quick", action="store_true", help="about a dozen cases")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--quick", action="store_true", help="about a dozen cases")
+    which.add_argument("--fresh", action="store_true", help="cases beyond the plan")
     parser.add_argument("--part", choices=list(COUNTS), help="this condition alone")
     parser.add_argument("--count", type=int, help="so many cases of each condition")
     parser.add_argument("--skip", type=int, default=0, help="leave out so many cases, the first of the order")
     parser.add_argument("--jobs", type=int, default=1, help="cases at once")
     chosen = parser.parse_args()
-    counts = {c: chosen.count or counts[chosen.quick] for c, counts in COUNTS.items() if chosen.part in (None, c)}
+    planned = FRESH if chosen.fresh else {condition: counts[chosen.quick] for condition, counts in COUNTS.items()}
+    counts = {c: chosen.count or count for c, count in planned.items() if chosen.part in (None, c)}
     processes = {"jobs": chosen.jobs, "together": _CASES_A_PROCESS}
-    cases = ordered(counts)[chosen.skip :]
-    results = assemble(completed(cases, chosen.out, work, said, name=lambda case: case.name, **processes))
+    cases = ordered(counts, chosen.fresh)[chosen.skip :]
+    results = sets(completed(cases, chosen.out, work, said, name=lambda case: case.name, **processes))
     (chosen.out / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")
-    draw(results, chosen.out / "figures")
+    for name, found in results.items():
+        draw(found, chosen.out / "figures" / name)
     terminal.note(f"results: {chosen.out / 'results.json'}")
 
 

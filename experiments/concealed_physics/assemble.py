@@ -1,5 +1,6 @@
 """From a line a case to `results.json`."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 
 from . import scoring
@@ -26,6 +27,7 @@ SIZE = (
     "rms over the training runs of what the effect leaves on its most affected channel, in true sigmas of that "
     "channel, after projection off the tangents of the free coefficients and initial states at the true vehicle"
 )
+_SETS = {"fresh": True, "practised": False}
 _SINGLE = ("strong", "weak", "faint")
 
 
@@ -70,6 +72,11 @@ def recovery(lines: Lines, answer: Callable[[dict], dict | None]) -> dict:
     }
 
 
+def sets(every: Lines) -> dict[str, dict]:
+    """What `assemble` makes of the fresh cases and of those on which engines were corrected; a set may be empty."""
+    return {name: assemble([x for x in every if x["fresh"] == fresh]) for name, fresh in _SETS.items()}
+
+
 def assemble(every: Lines) -> dict:
     """All that the issue asks for, of the cases that could be made."""
     lines = [line for line in every if "answer" in line]
@@ -88,6 +95,7 @@ def assemble(every: Lines) -> dict:
     seconds = sorted(line["answer"]["seconds"] for line in lines if "seconds" in line["answer"])
     return {
         "size": SIZE,
+        "engines": dict(Counter(line["engine"] for line in every)),
         "recovery": recovery(lines, ours),
         "recovery_by_length": {f"{s:g} s": scoring.rate(is_right(x, ours(x)) for x in at) for s, at in lengths.items()},
         "located": {
@@ -99,6 +107,7 @@ def assemble(every: Lines) -> dict:
             for c in dict.fromkeys(x["condition"] for x in told)
         },
         "false_alarm": {k: scoring.rate(scoring.false_alarm(ours(x)) for x in c) for k, c in clean.items()},
+        "false_alarms": scoring.rate(scoring.false_alarm(ours(x)) for x in lines if not x["concealed"]),
         "unknown_recall": scoring.rate(is_right(x, ours(x)) for x in lines if x["condition"] == "outside"),
         "all_named_with_extras": {
             c: scoring.rate(scoring.among(x["truth"]["names"], ours(x)) for x in lines if x["condition"] == c)
@@ -113,9 +122,18 @@ def assemble(every: Lines) -> dict:
         "seconds": {"median": seconds[len(seconds) // 2], "largest": seconds[-1]} if seconds else {},
         "conditions": conditions(lines, ours),
         "peers": {peer: _peer(lines, peer) for peer in ("pysindy", "stepwise_aic", "stepwise_bic")},
+        "cases": [_said(line) for line in lines],
         "failed": [{"case": x["case"], "error": x["answer"]["error"]} for x in lines if "error" in x["answer"]],
         "not_made": [{"case": x["case"], "truth": x["concealed"], "why": x["why"]} for x in every if "answer" not in x],
     }  # fmt: skip
+
+
+def _said(line: dict) -> dict:
+    """What was concealed in a case, and what was said of it."""
+    answer = line["answer"]
+    names = [scoring.offered(entry, answer["verdict"]) for entry in answer.get("physics", [])]
+    told = {"verdict": answer.get("verdict"), "names": names, "right": is_right(line, answer)}
+    return {"case": line["case"], "concealed": line["concealed"], "size": line["size"]} | told
 
 
 def _peer(lines: Lines, peer: str) -> dict:

@@ -16,6 +16,12 @@ COUNTS: dict[str, tuple[int, int]] = {
     "varying_noise": (8, 0), "outliers": (8, 0), "dropout": (8, 0), "slow": (8, 0), "uneven": (8, 0),
     "quantised": (8, 0),
 }  # fmt: skip
+# so many cases of a condition beyond those, on which no engine was ever corrected
+FRESH: dict[str, int] = {
+    "strong": 24, "weak": 18, "no_velocity": 10, "coloured": 12, "sigma": 10, "pair": 8, "triple": 6, "outside": 8,
+    "none_white": 15, "none_coloured": 15, "none_half": 15, "none_double": 15, "estimated": 5, "varying_noise": 3,
+    "outliers": 4, "dropout": 4, "slow": 4, "uneven": 4, "quantised": 3,
+}  # fmt: skip
 _SALT = 20_000
 
 
@@ -40,6 +46,11 @@ class Case:
     def seed(self) -> int:
         """Of manoeuvres, coefficients and noise; no two cases share one."""
         return 1000 * list(COUNTS).index(self.condition) + self.number
+
+    @property
+    def fresh(self) -> bool:
+        """Whether it lies beyond the plan, on whose cases engines were corrected."""
+        return self.number >= COUNTS[self.condition][0]
 
     @property
     def sizes(self) -> list[float]:
@@ -102,7 +113,9 @@ def _several(count: int, rng: np.random.Generator) -> tuple[str, ...]:
     return tuple(str(rng.choice(families[family])) for family in picked)
 
 
-def ordered(counts: dict[str, int]) -> list[Case]:
+def ordered(counts: dict[str, int], fresh: bool = False) -> list[Case]:
     """All cases, so that whatever has been done when one stops covers every condition in proportion."""
-    listed = [((i + 0.5) / n, case) for c, n in counts.items() for i, case in enumerate(cases(c, n))]
+    planned = {c: COUNTS[c][0] if fresh else 0 for c in counts}
+    chosen = {c: cases(c, planned[c] + n)[planned[c] :] for c, n in counts.items()}
+    listed = [((i + 0.5) / len(those), case) for those in chosen.values() for i, case in enumerate(those)]
     return [case for _, case in sorted(listed, key=lambda pair: (pair[0], pair[1].condition))]

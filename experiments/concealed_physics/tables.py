@@ -14,6 +14,7 @@ def tables(results: dict[str, Any]) -> dict[str, str]:
     return {
         "today, by condition": table(["right answers", *_SETS], rows),
         "today, also measured": table(["also measured", *_SETS], _also(results)),
+        "today, wrong": table(["case", "concealed", "size, σ", "answer"], _wrong(results)),
     }
 
 
@@ -30,16 +31,35 @@ def _rate(rate: dict[str, Any]) -> str:
 
 
 def _also(results: dict[str, Any]) -> list[list[str]]:
-    alarms = lambda found: [rate for rate in found["false_alarm"].values() if rate["n"]]
     told = {
-        "false alarms": lambda found: (
-            f"{sum(round(r['rate'] * r['n']) for r in alarms(found))} of {sum(r['n'] for r in alarms(found))}"
-        ),
+        "false alarms": lambda found: _rate(found["false_alarms"]),
         "first place right": lambda found: _rate(found["located"]["strict"]),
         "parameters within their 95 % interval": lambda found: _rate(found["coverage"]),
         "test error within 10 % of the floor": lambda found: _rate(found["held_out"]["within_10_percent"]),
-        "median and longest time of a case, s": lambda found: (
-            f"{found['seconds']['median']:.0f}, {found['seconds']['largest']:.0f}"
-        ),
+        "engines": lambda found: f"{len(found['engines'])}",
+        "cases that could not be made": lambda found: f"{len(found['not_made'])}",
+        "answers that ended in an error": lambda found: f"{len(found['failed'])}",
+        "median and longest time of a case, s": lambda found: _seconds(found["seconds"]),
     }
     return [[name, *(say(results[one]) for one in _SETS)] for name, say in told.items()]
+
+
+def _seconds(seconds: dict[str, float]) -> str:
+    return f"{seconds['median']:.0f}, {seconds['largest']:.0f}" if seconds else "–"
+
+
+def _wrong(results: dict[str, Any]) -> list[list[str]]:
+    """Every case that was answered wrongly, of either set."""
+    cases = [case for one in _SETS for case in results[one]["cases"] if not case["right"]]
+    return [
+        [c["case"], ", ".join(c["concealed"]) or "nothing", f"{c['size']:g}", _answer(c["verdict"], c["names"])]
+        for c in cases
+    ]
+
+
+def _answer(verdict: str | None, names: list[list[str]]) -> str:
+    """Verdict and names; those of rivals stand behind a stroke."""
+    if verdict is None:
+        return "none: it ended in an error"
+    said = ", ".join(" / ".join(each) for each in names)
+    return f"{verdict}: {said}" if said else verdict

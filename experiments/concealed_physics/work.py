@@ -5,6 +5,8 @@ import traceback
 from functools import partial
 from pathlib import Path
 
+from jaxsub.fingerprint import surroundings
+
 from ..cases import with_files
 from .generate import generate
 from .judge import judge
@@ -14,7 +16,7 @@ from .plan import Case
 
 def work(case: Case) -> dict:
     """The line of `case`; it has no `answer` where its files could not be made."""
-    line = dataclasses.asdict(case) | {"case": case.name}
+    line = dataclasses.asdict(case) | {"case": case.name, "fresh": case.fresh, "engine": surroundings()[:12]}
     return with_files(line, partial(generate, case), partial(_answered, case))
 
 
