@@ -43,10 +43,16 @@ def digest(function: Callable, arguments: Any) -> str:
 @functools.cache
 def surroundings() -> str:
     """A digest of what every program depends on: jaxsub's sources, what is installed, the kind of device."""
+    parts = [sources(), *_installed(), sys.version, platform.machine(), jax.default_backend()]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+@functools.cache
+def sources() -> str:
+    """A digest of jaxsub's sources."""
     found, folder = hashlib.sha256(), Path(__file__).parent
     for path in sorted(folder.rglob("*.py")):
         found.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
-    found.update("\n".join([*_installed(), sys.version, platform.machine(), jax.default_backend()]).encode())
     return found.hexdigest()
 
 

@@ -73,8 +73,9 @@ def recovery(lines: Lines, answer: Callable[[dict], dict | None]) -> dict:
 
 
 def sets(every: Lines) -> dict[str, dict]:
-    """What `assemble` makes of the fresh cases and of those on which engines were corrected; a set may be empty."""
-    return {name: assemble([x for x in every if x["fresh"] == fresh]) for name, fresh in _SETS.items()}
+    """What `assemble` makes of the fresh cases and of those on which engines were corrected, where there are any."""
+    chosen = {name: [line for line in every if line["fresh"] == fresh] for name, fresh in _SETS.items()}
+    return {name: assemble(lines) for name, lines in chosen.items() if lines}
 
 
 def assemble(every: Lines) -> dict:
@@ -122,6 +123,7 @@ def assemble(every: Lines) -> dict:
         "seconds": {"median": seconds[len(seconds) // 2], "largest": seconds[-1]} if seconds else {},
         "conditions": conditions(lines, ours),
         "peers": {peer: _peer(lines, peer) for peer in ("pysindy", "stepwise_aic", "stepwise_bic")},
+        "right": scoring.rate(is_right(x, ours(x)) for x in lines),
         "cases": [_said(line) for line in lines],
         "failed": [{"case": x["case"], "error": x["answer"]["error"]} for x in lines if "error" in x["answer"]],
         "not_made": [{"case": x["case"], "truth": x["concealed"], "why": x["why"]} for x in every if "answer" not in x],

@@ -4,16 +4,15 @@ from typing import Any
 
 from ..tables import table
 
-_SETS = ("fresh", "practised")
-
 
 def tables(results: dict[str, Any]) -> dict[str, str]:
-    """By condition the cases answered rightly, and what else was measured, of fresh and of practised cases."""
-    conditions = [row["condition"] for row in results[_SETS[0]]["conditions"]]
-    rows = [[name, *(_right(results[one], name) for one in _SETS)] for name in conditions]
+    """By condition the cases answered rightly, what else was measured, and every wrong answer, by set of cases."""
+    conditions = [row["condition"] for row in next(iter(results.values()))["conditions"]]
+    rows = [[name, *(_right(found, name) for found in results.values())] for name in conditions]
+    rows.append(["all", *(_rate(found["right"]) for found in results.values())])
     return {
-        "today, by condition": table(["right answers", *_SETS], rows),
-        "today, also measured": table(["also measured", *_SETS], _also(results)),
+        "today, by condition": table(["right answers", *results], rows),
+        "today, also measured": table(["also measured", *results], _also(results)),
         "today, wrong": table(["case", "concealed", "size, σ", "answer"], _wrong(results)),
     }
 
@@ -41,7 +40,7 @@ def _also(results: dict[str, Any]) -> list[list[str]]:
         "answers that ended in an error": lambda found: f"{len(found['failed'])}",
         "median and longest time of a case, s": lambda found: _seconds(found["seconds"]),
     }
-    return [[name, *(say(results[one]) for one in _SETS)] for name, say in told.items()]
+    return [[name, *map(say, results.values())] for name, say in told.items()]
 
 
 def _seconds(seconds: dict[str, float]) -> str:
@@ -50,7 +49,7 @@ def _seconds(seconds: dict[str, float]) -> str:
 
 def _wrong(results: dict[str, Any]) -> list[list[str]]:
     """Every case that was answered wrongly, of either set."""
-    cases = [case for one in _SETS for case in results[one]["cases"] if not case["right"]]
+    cases = [case for found in results.values() for case in found["cases"] if not case["right"]]
     return [
         [c["case"], ", ".join(c["concealed"]) or "nothing", f"{c['size']:g}", _answer(c["verdict"], c["names"])]
         for c in cases

@@ -5,7 +5,7 @@ import traceback
 from functools import partial
 from pathlib import Path
 
-from jaxsub.fingerprint import surroundings
+from jaxsub.fingerprint import sources
 
 from ..cases import with_files
 from .generate import generate
@@ -16,7 +16,7 @@ from .plan import Case
 
 def work(case: Case) -> dict:
     """The line of `case`; it has no `answer` where its files could not be made."""
-    line = dataclasses.asdict(case) | {"case": case.name, "fresh": case.fresh, "engine": surroundings()[:12]}
+    line = dataclasses.asdict(case) | {"case": case.name, "fresh": case.fresh, "engine": sources()[:12]}
     return with_files(line, partial(generate, case), partial(_answered, case))
 
 
