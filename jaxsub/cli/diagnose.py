@@ -125,5 +125,5 @@ def show(answer: Diagnosis, explain: bool = False) -> None:
     `explain` adds a row for every decision, in order.
     """
     title = answer.verdict + ("" if answer.complete else " (incomplete)")
-    terminal.results.print(Panel(Text(answer.sentence), title=title, expand=False))
+    terminal.results.print(Panel(Text(answer.sentence), title=title, expand=False), soft_wrap=False)
     terminal.show([*answer.tables(), *([answer.decisions()] if explain else [])])

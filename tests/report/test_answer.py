@@ -32,6 +32,15 @@ def shown(capsys, made, **options):
 
 
 @pytest.mark.parametrize("verdict", ["none", "named", "ambiguous", "unknown"])
+def test_the_sentence_is_whole_at_any_width(verdict, capsys):
+    """Claim: in a pipe, which is taken to be 80 columns wide, no word of the sentence in its frame is cut off."""
+    made = diagnosis(verdict, samples=40)
+    lines = re.findall(r"^│ (.*) │$", shown(capsys, made).partition("╰")[0], re.MULTILINE)
+    assert " ".join(" ".join(lines).split()) == Diagnosis(made, dsrv()).sentence
+    assert len(lines) > 1 and max(map(len, lines)) <= 76
+
+
+@pytest.mark.parametrize("verdict", ["none", "named", "ambiguous", "unknown"])
 def test_json_is_the_file_and_nothing_else(verdict, capsys, tmp_path):
     """Claim: with numbers that are not finite too, standard output is one valid JSON text, that of the file."""
     made = diagnosis(verdict, samples=40)
