@@ -95,7 +95,7 @@ def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Para
             raise unknown_key(f"{place}.{key}", _NUMBER_KEYS, key)
     if "value" not in table.data:
         raise InputError(place, "has no value", "write { value = … }")
-    if isinstance(table.data["value"], str) and len(table.data) > 1:
+    if isinstance(table.data["value"], str) and len(table.data) > 1 and not _spells_number(table.data["value"]):
         remedy = "write the expression alone; bounds, prior and varies are for the numbers that it follows"
         raise InputError(place, "has an expression beside other keys", remedy)
     value = read_finite(table.data["value"], place)
@@ -209,6 +209,15 @@ def _real(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.nan
+
+
+def _spells_number(text: str) -> bool:
+    """Whether a text is a number in quotes, and so no expression."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _bounds(value: Any, place: str) -> tuple[float, float]:
