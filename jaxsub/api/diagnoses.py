@@ -12,7 +12,7 @@ from ..discrepancy.diagnosis import Coefficient, Location, Physics, Verdict
 from ..discrepancy.next_run import next_run, said
 from ..discrepancy.procedure import Keep
 from ..discrepancy.progress import Progress
-from ..discrepancy.stored import save_conclusions
+from ..discrepancy.stored import STORED, save_conclusions
 from ..effects import AbstractEffect
 from ..errors import InputError
 from ..estimate import require_free
@@ -225,7 +225,7 @@ class Diagnosis(AbstractResult):
         text = self.write_numbers(folder)
         if self.next_run is not None:
             save(self.next_run, folder / NEXT_RUN)
-        save_conclusions(self.conclusions, folder / "diagnosis.npz")
+        save_conclusions(self.conclusions, folder / STORED)
         write_report(self.conclusions, text, folder)
 
     def write_numbers(self, folder: Path) -> str:

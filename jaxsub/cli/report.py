@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from ..discrepancy.stored import load_conclusions
+from ..discrepancy.stored import STORED, load_conclusions
 from ..errors import InputError
 from ..report import write_report
 from . import terminal
 from .output import redrawn
 
-STORED, IMPROVED = "diagnosis.npz", "improved.toml"
+IMPROVED = "improved.toml"
 
 
 def run(folder: Path) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import InputError
 from .diagnosis import Conclusions
 
+STORED = "diagnosis.npz"
 _SCHEMA, _TEXT = 1, "conclusions"
 # what reading a file that is none of ours may raise
 _DAMAGED = (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error)

@@ -91,6 +91,15 @@ def aligned_by_fixes(
     return FixAlignment(np.roll(attitude.as_quat(), 1), _velocity(part, seen[0], attitude, x), x[3:6], x[6:], std)
 
 
+class _Path(NamedTuple):
+    """Attitudes (k, 3, 3), velocities and positions (k, 3) at `times` (k,), without gravity, in axes of the start."""
+
+    times: np.ndarray
+    R: np.ndarray
+    velocity: np.ndarray
+    position: np.ndarray
+
+
 class _Motion(NamedTuple):
     """Integrals of the sensors' readings between times: `times` (k + 1,) s, `turns` (k, 3) rad, `gains` (k, 3) m/s."""
 
@@ -111,15 +120,15 @@ class _Motion(NamedTuple):
         k = int(np.searchsorted(self.times, time))
         return _Motion(self.times[: k + 1], self.turns[:k], self.gains[:k])
 
-    def integrated(self, gyro_bias: np.ndarray, accelerometer_bias: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Attitudes (k + 1, 3, 3), velocities and positions (k + 1, 3) without gravity, in the axes of the start."""
+    def path(self, x: np.ndarray) -> _Path:
+        """The path with the biases of x (9,)."""
         dt = np.diff(self.times)[:, None]
-        turns = self.turns - gyro_bias * dt
+        turns = self.turns - x[3:6] * dt
         R = np.concatenate([np.eye(3)[None], _products(Rotation.from_rotvec(turns).as_matrix())])
         middle = R[:-1] @ Rotation.from_rotvec(0.5 * turns).as_matrix()
-        gains = np.einsum("kij,kj->ki", middle, self.gains - accelerometer_bias * dt)
+        gains = np.einsum("kij,kj->ki", middle, self.gains - x[6:] * dt)
         velocity = np.concatenate([np.zeros((1, 3)), np.cumsum(gains, axis=0)])
-        return R, velocity, cumulative_trapezoid(velocity, self.times, axis=0, initial=0.0)
+        return _Path(self.times, R, velocity, cumulative_trapezoid(velocity, self.times, axis=0, initial=0.0))
 
 
 def _products(factors: np.ndarray) -> np.ndarray:
@@ -161,11 +170,10 @@ class _Fixes(NamedTuple):
         fallen = GRAVITY * (self.times - start) ** self.integrals / self.integrals
         return self.values - fallen[:, None] * np.array([0.0, 0.0, 1.0])[: self.values.shape[1]]
 
-    def by_sensors(self, motion: _Motion, x: np.ndarray) -> np.ndarray:
+    def by_sensors(self, path: _Path) -> np.ndarray:
         """(m, 3) what the inertial sensors show in place of them, in the axes of the start."""
-        R, velocity, position = motion.integrated(x[3:6], x[6:])
-        moved = position + R @ self.arm if self.integrals == 2 else velocity
-        return interpolated(self.times, motion.times, moved)
+        moved = path.position + path.R @ self.arm if self.integrals == 2 else path.velocity
+        return interpolated(self.times, path.times, moved)
 
     def powers(self, start: float) -> np.ndarray:
         """(m, n) powers of time that the unknown first position and velocity add."""
@@ -180,10 +188,10 @@ class _Fixes(NamedTuple):
 def _headed(motion: _Motion, fixes: Sequence[_Fixes], level: Rotation, x: np.ndarray) -> Rotation:
     """The level attitude turned about the vertical to the heading that explains the fixes best, in closed form."""
     along = across = 0.0
+    start, path = motion.times[0], motion.path(x)
     for one in fixes:
-        start = motion.times[0]
         seen = one.without_start(one.apart_from_gravity(start), start)
-        shown = level.apply(one.without_start(one.by_sensors(motion, x), start))
+        shown = level.apply(one.without_start(one.by_sensors(path), start))
         along += float(np.sum(seen[:, :2] * shown[:, :2]))
         across += float(np.sum(seen[:, 1] * shown[:, 0] - seen[:, 0] * shown[:, 1]))
     return Rotation.from_rotvec([0.0, 0.0, np.arctan2(across, along)]) * level
@@ -196,9 +204,9 @@ def _fitted(
     start = motion.times[0]
 
     def residuals(x: np.ndarray) -> np.ndarray:
-        attitude, found = Rotation.from_rotvec(x[:3]) * about, [(x - mean) / std]
+        attitude, path, found = Rotation.from_rotvec(x[:3]) * about, motion.path(x), [(x - mean) / std]
         for one in fixes:
-            shown = attitude.apply(one.by_sensors(motion, x))[:, : one.values.shape[1]]
+            shown = attitude.apply(one.by_sensors(path))[:, : one.values.shape[1]]
             rest = one.without_start(one.apart_from_gravity(start) - shown, start)
             found.append((rest / one.sigma).ravel())
         return np.concatenate(found)
@@ -220,6 +228,6 @@ def _turns_of_vector(v: np.ndarray) -> np.ndarray:
 def _velocity(motion: _Motion, fixes: _Fixes, attitude: Rotation, x: np.ndarray) -> np.ndarray:
     """(3,) the velocity at the start, m/s; zero in axes without fixes."""
     start, axes = motion.times[0], fixes.values.shape[1]
-    rest = fixes.apart_from_gravity(start) - attitude.apply(fixes.by_sensors(motion, x))[:, :axes]
+    rest = fixes.apart_from_gravity(start) - attitude.apply(fixes.by_sensors(motion.path(x)))[:, :axes]
     found = np.linalg.lstsq(fixes.powers(start), rest)[0][-1]
     return np.concatenate([found, np.zeros(3 - axes)])

@@ -73,9 +73,8 @@ def start_of(log: SensorLog, suite: SensorSuite) -> Start:
     if rest:
         # what it shows at rest is bias, but for its noise and Earth's rate
         bias, bias_std = rates.mean(axis=0), min(bias_std, gyro.noise.density / math.sqrt(_WINDOW) + 7.3e-5)
-    by_fixes = None
-    if heading == "unknown":
-        by_fixes = aligned_by_fixes(log, suite, q, bias, bias_std, *([tilt] if rest else []))
+    known = {"tilt_std": tilt} if rest else {}
+    by_fixes = aligned_by_fixes(log, suite, q, bias, bias_std, **known) if heading == "unknown" else None
     offset = np.zeros(3)
     std = np.repeat([tilt, slow, place, bias_std, accelerometer.noise.bias, max(gyro.noise.scale_error, 1e-6)], 3)
     std[2] = turn
