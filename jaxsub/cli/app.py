@@ -18,7 +18,10 @@ STARTS = ("rest", "recorded", "estimated")
 _SENSORS = "sensors"
 KINDS = ("auv", "glider", "rov", "ship", "usv")
 SHELLS = ("bash", "zsh", "fish")
-PUBLISHED = ("bluerov2-heavy", "kvlcc2", "otter", "remus-100")
+PUBLISHED = (
+    "bluerov2-heavy", "dsrv", "kvlcc2", "nps-auv-ii", "otter", "remus-100", "remus-100-linear", "rexrov", "seaglider",
+    "slocum", "suboff", "torpedo",
+)  # fmt: skip
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
 _columns = click.option("--columns", type=_PATH, help="A TOML file that says which channels of a log to take.")
@@ -181,7 +184,7 @@ def navigate(log: Path, sensors: Path, reference: Path | None, out: Path, overwr
 @click.argument("kind", type=click.Choice((*KINDS, _SENSORS)), required=False)
 @click.argument("sensor_log", type=_PATH, required=False)
 @dimensions
-@click.option("--like", type=click.Choice(PUBLISHED), help="A published vehicle in place of a kind.")
+@click.option("--like", type=process.Name(PUBLISHED), help="A published vehicle in place of a kind.")
 @click.option("--log", type=_PATH, help="A recording whose columns are the inputs and outputs.")
 @_columns
 @_out()

@@ -46,6 +46,22 @@ class Location(click.ParamType):
         return [CompletionItem(incomplete, type="file")]
 
 
+class Name(click.Choice):
+    """One of some names, of which a mistyped one is told its nearest neighbour."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The name.
+
+        Raises
+            click.UsageError: it is none of them.
+        """
+        if value not in self.choices:
+            near = nearest(str(value), map(str, self.choices))
+            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(map(str, self.choices))}"
+            self.fail(f"{value!r:.60} is not known; {hint}", param, ctx)
+        return value
+
+
 class Commands(click.Group):
     """Commands of which a mistyped one is told its nearest neighbour."""
 

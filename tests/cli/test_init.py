@@ -81,6 +81,8 @@ def test_a_published_vehicle_is_begun_with_the_columns_of_a_log(monkeypatch, cap
         (("--length", "long"), "'long' is no number"),
         (("--length", "1", "--mass", "2"), "--diameter: is missing for an AUV"),
         (("--like", "otter"), "--like: is given beside auv"),
+        (("--like", "seaglyder"), "'seaglyder' is not known; did you mean seaglider?"),
+        (("--like", "titanic"), "'titanic' is not known; choose one of bluerov2-heavy"),
     ],
 )
 def test_dimensions_that_cannot_be_are_bad_input(monkeypatch, capsys, given, said):
