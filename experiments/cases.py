@@ -68,8 +68,8 @@ def run(
         with lock:
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(line) + "\n")
-            told = f"{next(number)}/{len(todo)} {said(line)}"
-            terminal.note(told)
+            message = f"{next(number)}/{len(todo)} {said(line)}"
+            terminal.note(message)
 
     def keep_going(core: int) -> None:
         spawn, own = multiprocessing.get_context("spawn"), (core,) if jobs > 1 else ()

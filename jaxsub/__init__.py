@@ -86,7 +86,7 @@ _MODULES = {name: module for module, names in _NAMES.items() for name in names.s
 
 
 def __getattr__(name: str) -> Any:
-    """A public name, imported when it is first asked for: `import jaxsub` alone loads neither JAX nor a table."""
+    """A public name, imported at its first use: `import jaxsub` alone loads neither JAX nor a table."""
     if name == "__version__":
         from importlib.metadata import version
 

@@ -5,7 +5,7 @@ from typing import cast
 import optimistix as optx
 
 
-# an equinox Enumeration, which may be subclassed, but pyright is told that it is an `enum.Enum`
+# an equinox Enumeration, which may be subclassed, but for pyright it is an `enum.Enum`
 class RESULTS(optx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
     """Outcomes of a fit. Failures are values, so that they can be masked and counted under `vmap`."""
 

@@ -3,7 +3,7 @@
 All that is not linear is missing from its file, and the vehicle does not run free for long.
 
 Every flight is files of its own, and the judge sees only them. `results.json`: names that are there and are not, their
-numbers beside the publication's, and what runs that were held out show before and after.
+numbers beside the publication's, and the errors on test runs before and after.
 """
 
 import argparse
@@ -58,11 +58,11 @@ def write(folder: Path, number: int) -> None:
 
 
 def judged(folder: Path) -> dict:
-    """What a diagnosis says of the files, the last run held out, beside what is true."""
+    """What a diagnosis says of the files, the last run as test run, beside what is true."""
     runs = [load(path) for path in sorted(folder.glob("run*.csv"))]
     begin = time.perf_counter()
-    told = lambda message: terminal.note(message)
-    found, _ = diagnose(read_vehicle(folder / "vehicle.toml"), runs[:-1], runs[-1:], progress=told)
+    note = lambda message: terminal.note(message)
+    found, _ = diagnose(read_vehicle(folder / "vehicle.toml"), runs[:-1], runs[-1:], progress=note)
     seconds = time.perf_counter() - begin
     numbers = {}
     for one in found.physics:

@@ -1,4 +1,4 @@
-"""The picture: found numbers over published ones, and what held-out runs leave before and after."""
+"""The picture: found numbers over published ones, and errors on test runs before and after."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -40,7 +40,7 @@ def draw(lines: Sequence[dict], path: Path) -> None:
     right.plot([], [], "o-", color=_AFTER, label="after")
     right.axvline(1.0, color="black", lw=0.8)
     right.set_xscale("log")
-    right.set_xlabel("held-out rms / σ, free runs")
+    right.set_xlabel("rms / σ of open-loop simulations, test runs")
     right.legend(frameon=False)
     right.invert_yaxis()
     for axis in (left, right):

@@ -100,11 +100,11 @@ def whole(out: Path, quick: bool) -> dict:
                 *(str(folder / f"run{i}.csv") for i in (1, 2, 3)), "--out", str(folder / label),
             ]  # fmt: skip
             begin = time.perf_counter()
-            told = subprocess.run(
+            process = subprocess.run(
                 command, env=environment, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
             )
             verdict = json.loads((folder / label / "diagnosis.json").read_text())
-            making = json.loads(told.stdout.splitlines()[-1])
+            making = json.loads(process.stdout.splitlines()[-1])
             results[label] = {
                 "seconds": time.perf_counter() - begin,
                 "programs": int(making.pop("programs")),

@@ -94,8 +94,8 @@ def _candidates(sizes: tuple[int, ...], quick: bool) -> dict:
 def _peaks(sizes: tuple[int, ...]) -> dict[str, float]:
     """Peak memory of a process that evaluates so many members, for the least and the most."""
     command = [sys.executable, "-m", "experiments.benchmarks.growth"]
-    told = lambda n: subprocess.run([*command, str(n)], check=True, capture_output=True).stdout
-    return {str(n): json.loads(told(n)) for n in (sizes[0], sizes[-1])}
+    printed = lambda n: subprocess.run([*command, str(n)], check=True, capture_output=True).stdout
+    return {str(n): json.loads(printed(n)) for n in (sizes[0], sizes[-1])}
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ def run(out: Path, quick: bool) -> dict:
 
 
 def _ours(problem: Problem, starts: np.ndarray, made_s: float, quick: bool) -> dict:
-    """A sweep of as many starts as there is time for, told from a few; made and compiled apart."""
+    """A sweep of as many starts as there is time for by the speed of a few; made and compiled before."""
     row = swept(problem, starts[: 4 if quick else _TRIAL])
     if not quick:
         row = swept(problem, starts[: 2 * int(min(COUNT, _LIMIT / (row["seconds"] / _TRIAL)) / 2)])

@@ -79,7 +79,7 @@ def sets(every: Lines) -> dict[str, dict]:
 
 
 def assemble(every: Lines) -> dict:
-    """All that the issue asks for, of the cases that could be made."""
+    """All rates of the README, of the cases that could be made."""
     lines = [line for line in every if "answer" in line]
     ours = lambda line: line["answer"]
     named = [line for line in lines if line["truth"]["names"]]
@@ -91,7 +91,7 @@ def assemble(every: Lines) -> dict:
     concealed = [held[line["case"]] for line in named if line["case"] in held and is_right(line, line["answer"])]
     hits = [hit for x in lines for hit in scoring.covered(x["truth"]["numbers"], x["truth"]["names"], x["answer"])]
     families = lambda line: [TRUTHS[key].family for key in line["concealed"]]
-    told = [line for line in lines if "kinds" in line["answer"] and line["condition"] != "outside"]
+    judged = [line for line in lines if "kinds" in line["answer"] and line["condition"] != "outside"]
     lengths = {s: [x for x in lines if x["seconds"] == s and x["condition"] in ("short",)] for s in (40.0, 80.0)}
     seconds = sorted(line["answer"]["seconds"] for line in lines if "seconds" in line["answer"])
     return {
@@ -104,8 +104,8 @@ def assemble(every: Lines) -> dict:
             for kind, key in (("strict", "where"), ("lenient", "lenient"))
         },
         "kind": {
-            c: scoring.rate(scoring.first_kind(families(x), ours(x)) for x in told if x["condition"] == c)
-            for c in dict.fromkeys(x["condition"] for x in told)
+            c: scoring.rate(scoring.first_kind(families(x), ours(x)) for x in judged if x["condition"] == c)
+            for c in dict.fromkeys(x["condition"] for x in judged)
         },
         "false_alarm": {k: scoring.rate(scoring.false_alarm(ours(x)) for x in c) for k, c in clean.items()},
         "false_alarms": scoring.rate(scoring.false_alarm(ours(x)) for x in lines if not x["concealed"]),
@@ -134,8 +134,8 @@ def _said(line: dict) -> dict:
     """What was concealed in a case, and what was said of it."""
     answer = line["answer"]
     names = [scoring.offered(entry, answer["verdict"]) for entry in answer.get("physics", [])]
-    told = {"verdict": answer.get("verdict"), "names": names, "right": is_right(line, answer)}
-    return {"case": line["case"], "concealed": line["concealed"], "size": line["size"]} | told
+    judged = {"verdict": answer.get("verdict"), "names": names, "right": is_right(line, answer)}
+    return {"case": line["case"], "concealed": line["concealed"], "size": line["size"]} | judged
 
 
 def _peer(lines: Lines, peer: str) -> dict:

@@ -1,6 +1,6 @@
 """What others do with the same files: sparse regression of the force that the model lacks on a library of terms.
 
-PySINDy's STLSQ (Brunton et al. 2016; de Silva et al. 2020) with its threshold chosen by AICc on the held-out run
+PySINDy's STLSQ (Brunton et al. 2016; de Silva et al. 2020) with its threshold chosen by AICc on the test run
 (Mangan et al. 2017), and stepwise regression by AIC and by BIC. All get the same data: accelerations from the measured
 velocities by Savitzky-Golay, which smooths forces and terms alike; the model's own coefficients projected off, as a
 refit would; one column for each form of each force that the generator can conceal, in the generator's own formula,
@@ -133,7 +133,7 @@ def _stepwise(y: np.ndarray, terms: np.ndarray, price: float) -> list[int]:
 
 
 def _sindy(y: np.ndarray, terms: np.ndarray, y_held: np.ndarray, terms_held: np.ndarray) -> list[int] | None:
-    """The terms that STLSQ keeps at the threshold with the lowest AICc on the held-out run."""
+    """The terms that STLSQ keeps at the threshold with the lowest AICc on the test run."""
     try:
         from pysindy.optimizers import STLSQ  # pyright: ignore[reportMissingImports]
     except ImportError:

@@ -1,4 +1,4 @@
-"""Which cases there are: a row of the issue's table each, and the effects spread evenly over every row."""
+"""Which cases there are: a condition each, and the effects spread evenly over every row."""
 
 import dataclasses
 import itertools

@@ -80,7 +80,7 @@ def first_place(places: Sequence[Sequence[str]], answer: dict) -> bool:
 def first_kind(families: Sequence[str], answer: dict) -> bool:
     """Whether the kind of mismatch that the answer holds most probable is that of any concealed effect's family.
 
-    With nothing concealed it is random forces and noise alone.
+    With nothing concealed it is disturbance forces and noise.
     """
     true = {KINDS.get(family, "structure") for family in families} or {"disturbance"}
     kinds = answer.get("kinds") or {}
@@ -122,7 +122,7 @@ def covered(numbers: Sequence[dict], names: Sequence[str], answer: dict) -> list
 
 
 def held_out(answer: dict, floor: dict) -> dict | None:
-    """rms over channels of rms/σ on the held-out run: before, after, and with the true model."""
+    """rms over channels of rms/σ on the test run: before, after, and with the true model."""
     if "held_out" not in answer or not floor:
         return None
     overall = lambda by: math.sqrt(sum(by[c] ** 2 for c in floor) / len(floor))

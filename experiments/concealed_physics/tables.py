@@ -30,7 +30,7 @@ def _rate(rate: dict[str, Any]) -> str:
 
 
 def _also(results: dict[str, Any]) -> list[list[str]]:
-    told = {
+    columns = {
         "false alarms": lambda found: _rate(found["false_alarms"]),
         "first place right": lambda found: _rate(found["located"]["strict"]),
         "parameters within their 95 % interval": lambda found: _rate(found["coverage"]),
@@ -40,7 +40,7 @@ def _also(results: dict[str, Any]) -> list[list[str]]:
         "answers that ended in an error": lambda found: f"{len(found['failed'])}",
         "median and longest time of a case, s": lambda found: _seconds(found["seconds"]),
     }
-    return [[name, *map(say, results.values())] for name, say in told.items()]
+    return [[name, *map(say, results.values())] for name, say in columns.items()]
 
 
 def _seconds(seconds: dict[str, float]) -> str:

@@ -13,7 +13,7 @@ from jaxsub.parameters import number
 
 
 class PeriodicForce(AbstractForce):
-    """A force that comes and goes with a position: with the heading as a mooring's, with depth as in layers of water.
+    """A force that is periodic in a position: with the heading as a mooring's, with depth as in layers of water.
 
     τ = a sin(k η + φ₀) for one of the positions η (rad or m).
     """

@@ -4,7 +4,7 @@ Every record begins in flight and in a manoeuvre. Roll and pitch start at zero, 
 the heading: six filters start at six headings, and at every moment the one that has made the recording most likely
 so far speaks. GPS is the RTK track once a second, with noise and as it is. The noise is the sensors': rotor vibration
 of 2 to 5 m/s² and 8 °/s a sample at 120 Hz is at most 0.4 m/s²/√Hz and 0.7 °/s/√Hz, were it white. 0.3 of each is
-told; 0.1 was tried too, on paths 8, 9, 10 and 15, and so were eight headings.
+assumed; 0.1 was tried too, on paths 8, 9, 10 and 15, and so were eight headings.
 """
 
 import math
@@ -83,10 +83,10 @@ def records() -> list[Record]:
 
 
 def _record(path: int, unit: int, ahead: float, rows: pd.DataFrame, reference: pd.DataFrame) -> Record:
-    told = reference["t_s"].to_numpy()
+    known = reference["t_s"].to_numpy()
     times = rows["t_s"].to_numpy() - ahead
     # from the first fix on
-    inside = (times >= math.ceil(max(times[0], told[0]))) & (times <= told[-1])
+    inside = (times >= math.ceil(max(times[0], known[0]))) & (times <= known[-1])
     columns = lambda names: rows[names].to_numpy(float)[inside]
     # x forward, y left, z up
     turned = np.array([1.0, -1.0, -1.0])
@@ -95,7 +95,7 @@ def _record(path: int, unit: int, ahead: float, rows: pd.DataFrame, reference: p
     dot = columns(["dot_euler_x_rad", "dot_euler_y_rad"]) * [1.0, -1.0]
     position = reference[["north_m", "east_m", "down_m"]].to_numpy()
     attitude = reference[["roll_rad", "pitch_rad", "heading_rad"]].to_numpy()
-    return Record(path, unit, times[inside], gyro, accelerometer, dot, told, position, attitude)
+    return Record(path, unit, times[inside], gyro, accelerometer, dot, known, position, attitude)
 
 
 class Prepared(NamedTuple):
@@ -239,10 +239,10 @@ def _scores(record: Record, noise: float, found: Followed) -> dict:
     x, x_std = np.asarray(found.x)[:K], np.asarray(found.x_std)[:K]
     at, measured = fixes(record, noise)
     others = _others(record.times[at], measured, GPS_STD if noise else _RTK_STD)
-    told = record.reference_times[(record.reference_times >= _SETTLED) & (record.reference_times <= record.times[-1])]
+    times = record.reference_times[(record.reference_times >= _SETTLED) & (record.reference_times <= record.times[-1])]
     truth = lambda times: _interpolated(times, record.reference_times, record.position)
-    position = {"fused": _rms(_interpolated(told, record.times, x[:, 7:10]) - truth(told))}
-    position |= {name: _rms(track.at(told) - truth(told)) for name, track in others.items()}
+    position = {"fused": _rms(_interpolated(times, record.times, x[:, 7:10]) - truth(times))}
+    position |= {name: _rms(track.at(times) - truth(times)) for name, track in others.items()}
     outages = []
     for i, begin in enumerate(np.searchsorted(record.times, outage_times(record))):
         # every twelfth sample: ten a second
@@ -310,8 +310,8 @@ def _summary(scores: dict[str, dict]) -> dict:
         "outage_final_m": {m: root([o[m]["final"] for o in outages]) for m in methods},
         "outage_final_median_m": {m: float(np.median([o[m]["final"] for o in outages])) for m in methods},
         "gyro_bias_x_deg_s": {
-            f"unit {unit}": {"found": [b for name, b in biases.items() if name.endswith(f"unit {unit}")], "told": told}
-            for unit, told in _BIAS.items()
+            f"unit {unit}": {"found": [b for n, b in biases.items() if n.endswith(f"unit {unit}")], "told": stated}
+            for unit, stated in _BIAS.items()
         },
         "diverged": sum(r["diverged"] for r in of),
     }

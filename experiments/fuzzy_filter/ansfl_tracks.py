@@ -25,7 +25,7 @@ class ConstantVelocity(AbstractProcess):
 
 
 class Track:
-    """A track that can be asked for any time, by the fixes up to then: from the last of them on at a velocity."""
+    """A track that can be evaluated at any time, by the fixes up to then: from the last of them on at a velocity."""
 
     def __init__(self, times: np.ndarray, positions: np.ndarray, velocities: np.ndarray):
         self.times, self.positions, self.velocities = times, positions, velocities

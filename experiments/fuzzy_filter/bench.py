@@ -66,7 +66,7 @@ def bench(angle: Float[Array, ""], key: Key[Array, ""], seen: bool = False) -> B
 
 def filtered(process: AbstractProcess, rule: AbstractNoiseRule, run: Bench) -> Estimate:
     """What the attitude filter makes of `run`, started level with no bias; sensors' noise as `run` says it is."""
-    ways = jax.eval_shape(lambda x: process.apart(x, x), jnp.zeros(7)).size
+    ways = jax.eval_shape(lambda x: process.difference(x, x), jnp.zeros(7)).size
     half = 1.0 if ways == 6 else 0.5  # a quaternion's numbers move by half of an angle
     first = jnp.concatenate([jnp.full(ways - 3, 2.0 * DEGREE * half), jnp.full(3, 1.0 * DEGREE)])
     whole = ExtendedKalmanFilter(process, rule, jnp.eye(3), jnp.diag(first))

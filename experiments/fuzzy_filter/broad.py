@@ -1,11 +1,11 @@
 """BROAD: orientation of a hand-held sensor board against an optical reference, beside published and installed filters.
 
-The settings are round numbers of physics, but not chosen blindly: that a scale error is told at all, and axis by axis,
+The settings are round numbers of physics, but not chosen blindly: that a scale error is modelled, and axis by axis,
 was decided on the errors of trials 02, 06, 21 and 26 with some forty settings, so that only other trials judge them.
 The board stays within reach of a hand, which is all that keeps the velocity: its position is zero to half a metre, and
-comes and goes within a second. Sensors have the noise of their class and a scale error of 0.5 % (over motions of half a
+lasts less than a second. Sensors have the noise of their class and a scale error of 0.5 % (over motions of half a
 second, hence √s). The magnetometer's delay is found from the gyros alone, for a field that stands still turns at minus
-the body's rate. Errors that last for a time τ and are sampled every T are told to the filter as white noise of √(2τ/T)
+the body's rate. Errors that last for a time τ and are sampled every T are given to the filter as white noise of √(2τ/T)
 times their size.
 """
 
@@ -53,7 +53,7 @@ _MOST = np.repeat([math.radians(1.0), 0.3, 0.1, 1e-3, 1e-2], 3)
 
 
 class Settings(NamedTuple):
-    """What the filter is told, SI; the sensitivity table halves and doubles each."""
+    """What the filter assumes, SI; the sensitivity table halves and doubles each."""
 
     white: jax.Array | float = 1.0  # of the default, 0.01 °/s/√Hz and 0.01 m/s²/√Hz
     scale_error: jax.Array | float = 0.005  # √s
@@ -251,8 +251,8 @@ def run(out: Path, quick: bool) -> dict:
     # the peers loop in Python, a minute for the four trials: beside the filters, in a process of their own
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         waited = pool.map(_peer_scores, recorded, dips, [quick] * len(recorded))
-        told = [Settings()] if quick else [Settings(), Settings(scale_error=0.0)]
-        ours = {rule: _scores(recorded, rule, told, batch) for rule in _rules()}
+        settings = [Settings()] if quick else [Settings(), Settings(scale_error=0.0)]
+        ours = {rule: _scores(recorded, rule, settings, batch) for rule in _rules()}
         table = {} if quick else _sensitivity(recorded, batch)
         others = list(waited)
     methods = {rule: of[0] for rule, of in ours.items()}

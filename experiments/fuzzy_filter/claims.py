@@ -57,11 +57,11 @@ def _smaller_deviates_more(per_seed: PerSeed) -> dict:
 
 def _compared(per_seed: PerSeed, text: str, metric: str, ratio: float | None) -> dict:
     """`metric` of the two rules at the angles of Figs 6 to 8; an overshoot is claimed larger, the others smaller."""
-    told, holds = {}, True
+    figures, holds = {}, True
     for a in COMPARED:
         fuzzy, random = per_seed[a, "fuzzy"][metric], per_seed[a, "random"][metric]
         rate = Rate(int(np.sum(fuzzy > (ratio or 1.0) * random if ratio else fuzzy < random)), len(fuzzy))
-        told[a] = {
+        figures[a] = {
             "fuzzy": float(np.median(fuzzy)),
             "random": float(np.median(random)),
             "share_of_seeds": rate.share,
@@ -70,43 +70,46 @@ def _compared(per_seed: PerSeed, text: str, metric: str, ratio: float | None) ->
             "random_twice_the_range": float(np.median(per_seed[a, "random_double"][metric])),
         }
         holds &= rate.interval[0] > 0.5
-    return _claim(text, holds, told, "Figs 6-8")
+    return _claim(text, holds, figures, "Figs 6-8")
 
 
 def _steady(per_seed: PerSeed) -> dict:
-    told, holds = {}, True
+    figures, holds = {}, True
     for a in COMPARED:
         fuzzy, random = (np.abs(per_seed[a, name]["steady_mean_deg"]) for name in ("fuzzy", "random"))
         rate = Rate(int(np.sum(random > fuzzy)), len(fuzzy))
         over = Rate(int(np.sum(per_seed[a, "random"]["steady_mean_deg"] > 0.0)), len(fuzzy))
-        told[a] = {"share_worse": rate.share, "share_above": over.share, "random_deg": float(np.median(random))}
+        figures[a] = {"share_worse": rate.share, "share_above": over.share, "random_deg": float(np.median(random))}
         holds &= rate.interval[0] > 0.5
     return _claim(
-        "6.3 the steady-state error is higher with random noise, with a tendency to overshoot", holds, told, "Figs 6-8"
+        "6.3 the steady-state error is higher with random noise, with a tendency to overshoot",
+        holds,
+        figures,
+        "Figs 6-8",
     )
 
 
 def _from_below(traces: Mapping[tuple[float, str], Runs]) -> dict:
     """The random rule's estimate below the fuzzy rule's in the first 5 s, above zero error at some time after."""
-    told, holds = {}, True
+    figures, holds = {}, True
     for a in COMPARED:
         early = slice(TURN, TURN + round(5.0 / INTERVAL))
         fuzzy, random = traces[a, "fuzzy"].pitch, traces[a, "random"].pitch
         below = np.mean(random[:, early] - fuzzy[:, early], axis=1) < 0.0
         crosses = np.max(random[:, TURN:], axis=1) > a * DEGREE
         rate = Rate(int(np.sum(below & crosses)), len(below))
-        told[a] = {"share_of_seeds": rate.share, "interval": list(rate.interval)}
+        figures[a] = {"share_of_seeds": rate.share, "interval": list(rate.interval)}
         holds &= rate.interval[0] > 0.5
     text = "6.3 the random curve comes up from below the fuzzy one and crosses to a positive error"
-    return _claim(text, holds, told, "Figs 6-8")
+    return _claim(text, holds, figures, "Figs 6-8")
 
 
 def _oscillation(per_seed: PerSeed) -> dict:
     fuzzy, random = (per_seed[45.7, name]["oscillation_deg"] for name in ("fuzzy", "random"))
     rate = Rate(int(np.sum(random > fuzzy)), len(fuzzy))
-    told = {"fuzzy": float(np.median(fuzzy)), "random": float(np.median(random)), "share_of_seeds": rate.share}
-    much = rate.interval[0] > 0.5 and told["random"] > 1.5 * told["fuzzy"]
-    return _claim("6.3 steady oscillations are much larger with random noise", much, told, "Fig. 9")
+    figures = {"fuzzy": float(np.median(fuzzy)), "random": float(np.median(random)), "share_of_seeds": rate.share}
+    much = rate.interval[0] > 0.5 and figures["random"] > 1.5 * figures["fuzzy"]
+    return _claim("6.3 steady oscillations are much larger with random noise", much, figures, "Fig. 9")
 
 
 def _claim(text: str, holds: bool, figure: dict, paper: str) -> dict:

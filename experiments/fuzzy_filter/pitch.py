@@ -66,8 +66,8 @@ def runs(process: AbstractProcess, rule: Callable[[Array], AbstractNoiseRule], s
         truth = jnp.concatenate([jax.vmap(from_euler)(run.angles), run.bias], axis=1)
         errors = jax.vmap(process.apart)(found.x, truth)
         measured, known = run.measured.angles[:, 1], run.measured.known[:, 1]
-        told = (errors, found.x_std, found.noise_std, jnp.any(found.diverged))
-        return Runs._make((pitch_of(found), measured, known, nis, *told))
+        beside = (errors, found.x_std, found.noise_std, jnp.any(found.diverged))
+        return Runs._make((pitch_of(found), measured, known, nis, *beside))
 
     keys = jax.random.split(jax.random.key(4), seeds)
     return jax.jit(lambda angle: jax.vmap(lambda key: once(angle, key))(keys))

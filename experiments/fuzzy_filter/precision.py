@@ -203,7 +203,7 @@ def _least(kept: np.ndarray, root: bool) -> np.ndarray:
 
 def _compared(case: Case, low: Track, high: Track) -> dict[str, float | bool]:
     """By how much they differ, in standard deviations as they are in 64 bits."""
-    apart = jax.vmap(case.process.apart)(jnp.asarray(low.x), jnp.asarray(high.x))
+    apart = jax.vmap(case.process.difference)(jnp.asarray(low.x), jnp.asarray(high.x))
     change = np.concatenate([np.asarray(apart), low.theta - high.theta], axis=1)
     # along a quaternion that is of unit length P may be zero
     std = np.maximum(high.std, 1e-9 * high.std.max(axis=0))

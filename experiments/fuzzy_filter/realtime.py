@@ -23,8 +23,8 @@ from scipy.spatial.transform import Rotation
 from jaxsub.effects import GRAVITY
 from jaxsub.filter import AbstractNoiseRule, ConsistentFuzzyNoise, ExtendedKalmanFilter, FuzzyNoise
 from jaxsub.navigation import link
-from jaxsub.navigation.ahead import Packed, Program, native
 from jaxsub.navigation.attitude import Gyro, RotationAttitude
+from jaxsub.navigation.compiled_step import Packed, Program, native
 from jaxsub.navigation.constructed import ConstructedAttitudeStream
 from jaxsub.navigation.stream import Reading, Stream
 

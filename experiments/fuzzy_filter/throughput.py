@@ -76,7 +76,7 @@ def _data(batch: int, rng: np.random.Generator) -> Data:
 
 
 def _ours(form: AbstractForm, kind: DTypeLike, whole: bool = False) -> Callable[[jax.Array, jax.Array], tuple]:
-    """States and covariances after each sample, (B, K, 7) and (B, K, 7, 7); and the `whole` estimate if asked for."""
+    """States and covariances after each sample, (B, K, 7) and (B, K, 7, 7); and the `whole` estimate if requested."""
     cast = lambda a: jnp.asarray(a, kind)
     noise = ConstantNoise(jnp.diag(cast(_DENSITY)))
     filter = ExtendedKalmanFilter(Attitude(), noise, jnp.diag(cast(_SIGMA)), jnp.diag(cast(_START)), form)
@@ -111,7 +111,7 @@ def _dynamax(kind: DTypeLike, whole: bool = False) -> Callable[[jax.Array, jax.A
     def one(rates: jax.Array, angles: jax.Array) -> tuple:
         found: Any = extended_kalman_filter(params, angles, rates)
         bare = found.filtered_means, found.filtered_covariances
-        # what is not asked for is not computed either
+        # what is not requested is not computed either
         return (*bare, found) if whole else bare
 
     return jax.vmap(one)

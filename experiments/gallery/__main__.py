@@ -48,7 +48,7 @@ class Stage:
 
 
 def effect_of(scene: Scene, on: Stage) -> AbstractEffect:
-    """The form that the scene asks for, of the size that it states or that moves its channel by `SHARE`."""
+    """The form that the scene needs, of the size that it states or that moves its channel by `SHARE`."""
     form = next(e for e in on.candidates if e.name == scene.name and (not scene.label or f"[{scene.label}" in e.label))
     stated = with_numbers(form, numbers(form) | dict(scene.numbers))
     free = [name for name in amplitudes(form) if name not in scene.numbers]

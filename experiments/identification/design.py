@@ -59,11 +59,11 @@ def run(out: Path, quick: bool) -> dict:
         "seconds": float(times[-1]),
         "coefficients": len(made.information.names),
         "limits": {"amplitude": _AMPLITUDE, "rate": RATE, "channels": dict(_LIMITS.channels), "energy": limits.energy},
-        "manoeuvres": {name: _row(told, paper[1]) for name, (_, told) in rows.items()},
+        "manoeuvres": {name: _row(found, paper[1]) for name, (_, found) in rows.items()},
         "gain_over_prbs": made.information.gain(paper[1]),
         "gain_over_prbs_best_hold": made.information.gain(_median(random[hold])[1]),
         "gain_over_prbs_luckiest": made.information.gain(lucky[1]),
-        "prbs_gain_by_hold": {f"{h:g}": [told.gain(paper[1]) for _, told in random[h]] for h in random},
+        "prbs_gain_by_hold": {f"{h:g}": [found.gain(paper[1]) for _, found in random[h]] for h in random},
         "history": made.history,
         "designed_at_wrong_coefficients": [
             _designed_wrong(vehicle, times, limits, starts, steps, seed).gain(paper[1]) for seed in range(wrongs)
@@ -71,18 +71,18 @@ def run(out: Path, quick: bool) -> dict:
     }
 
 
-def _row(told: Information, paper: Information) -> dict:
-    errors = told.standard_errors
+def _row(found: Information, paper: Information) -> dict:
+    errors = found.standard_errors
     worst = max(errors, key=lambda name: errors[name])
     return {
-        "d_gain": told.gain(paper),
-        "d_information_per_second": float(np.exp(told.log_det / len(told.names))) / told.seconds,
-        "trace_per_second": told.per_second,
-        "least_eigenvalue": told.least,
+        "d_gain": found.gain(paper),
+        "d_information_per_second": float(np.exp(found.log_det / len(found.names))) / found.seconds,
+        "trace_per_second": found.per_second,
+        "least_eigenvalue": found.least,
         "worst": {worst: errors[worst]},
         "median_standard_error": float(np.median(list(errors.values()))),
-        "energy": told.energy,
-        "peaks": {name: told.peaks[name] for name in _LIMITS.channels},
+        "energy": found.energy,
+        "peaks": {name: found.peaks[name] for name in _LIMITS.channels},
     }
 
 

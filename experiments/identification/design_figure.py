@@ -55,19 +55,19 @@ def draw(path: Path, vehicle: AbstractVehicle, rows: Mapping[str, tuple[Recordin
 
 def _bars(figure: SubFigure, rows: Mapping[str, tuple[Recording, Information]]) -> None:
     order = sorted(rows, key=lambda name: rows[name][1].log_det)
-    told = [rows[name][1] for name in order]
+    chosen = [rows[name][1] for name in order]
     reference = rows["PRBS of the paper"][1]
     upper, lower = figure.subplots(2, 1)
     measures = (
-        ("information per second (D-criterion), 1/s", [np.exp(i.log_det / len(i.names)) / i.seconds for i in told]),
-        ("worst relative standard error, %", [100.0 * max(i.standard_errors.values()) for i in told]),
+        ("information per second (D-criterion), 1/s", [np.exp(i.log_det / len(i.names)) / i.seconds for i in chosen]),
+        ("worst relative standard error, %", [100.0 * max(i.standard_errors.values()) for i in chosen]),
     )
     for axis, (label, values) in zip((upper, lower), measures, strict=True):
         axis.barh(order, values, color=[_COLOURS.get(name, "#5b7c99") for name in order])
         axis.set_xlabel(label)
         axis.spines[["top", "right"]].set_visible(False)
         axis.margins(x=0.2)
-    for i, found in enumerate(told):
+    for i, found in enumerate(chosen):
         upper.text(measures[0][1][i], i, f" ×{found.gain(reference):.2f}", va="center", fontsize=9)
         lower.text(measures[1][1][i], i, f" {measures[1][1][i]:.1f}", va="center", fontsize=9)
     upper.set_title("gain over the paper's PRBS beside each bar", fontsize=10, loc="left")

@@ -57,8 +57,8 @@ def problem(vehicle: AbstractVehicle, recorded: Sequence[Recording]) -> Problem:
 def fitted(problem: Problem, found: Found) -> Solution:
     """The fit where one search ended."""
     vehicle, states = problem.split(found.y)
-    told = found.cost, found.evaluations, found.result
-    return evaluate(SearchEnd(vehicle, problem.runs, states, problem.sigma, *told, known_start=True))
+    outcome = found.cost, found.evaluations, found.result
+    return evaluate(SearchEnd(vehicle, problem.runs, states, problem.sigma, *outcome, known_start=True))
 
 
 def relative_errors(vehicle: AbstractVehicle, true: AbstractVehicle) -> dict[str, float]:

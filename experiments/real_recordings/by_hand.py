@@ -18,7 +18,7 @@ from .case import Case
 
 
 def by_hand(case: Case, folder: Path) -> dict:
-    """Held-out rms of the baseline and of the baseline with `case.picked`, field units; writes `by_hand.toml`."""
+    """rms on the test runs of the baseline and of that with `case.picked`, field units; writes `by_hand.toml`."""
     file, results, labels = folder / "by_hand.toml", {}, []
     for label, text in (("baseline", case.vehicle), ("picked", case.vehicle + case.picked)):
         file.write_text(text, encoding="utf-8")

@@ -1,7 +1,7 @@
 """EMPS, an electro-mechanical positioning system (public origin: Janot, Gautier and Brunot 2019, nonlinear benchmark).
 
 One coordinate: drive voltage in, carriage position out, linear friction as baseline; trained on the smooth run, tested
-by free-run simulation on the run with pulses. The force per volt is the published 35.15 N/V.
+by open-loop simulation of the run with pulses. The force per volt is the published 35.15 N/V.
 """
 
 from pathlib import Path

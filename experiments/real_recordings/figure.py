@@ -1,4 +1,4 @@
-"""The figure of a set: held-out runs over time, measured, by the baseline and by the improved model."""
+"""The figure of a set: test runs over time, measured, by the baseline and by the improved model."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ _MOST_RUNS = 3
 
 
 def draw_held_out(diagnosis: Conclusions, case: Case, path: Path) -> None:
-    """Up to three held-out runs side by side; each channel's traces with the errors below them, in field units."""
+    """Up to three test runs side by side; each channel's traces with the errors below them, in field units."""
     chosen = _spread(diagnosis.overlays)
     channels = list(case.channels)
     with style():
@@ -36,7 +36,7 @@ def draw_held_out(diagnosis: Conclusions, case: Case, path: Path) -> None:
 
 
 def _spread(overlays: list[Overlay]) -> list[Overlay]:
-    """The first, middle and last of the held-out runs."""
+    """The first, middle and last of the test runs."""
     picked = np.unique(np.linspace(0, len(overlays) - 1, _MOST_RUNS).round().astype(int))
     return [overlays[i] for i in picked]
 

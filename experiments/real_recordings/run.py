@@ -34,7 +34,7 @@ def diagnose_case(case: Case, folder: Path) -> tuple[Conclusions, dict]:
 
 
 def numbers(diagnosis: Conclusions, case: Case) -> dict:
-    """What was left out, how large it is, what it is worth on the held-out runs, and what remains."""
+    """What was left out, how large it is, the gain on the test runs, and what remains."""
     scaled = lambda rms: {f"{c} ({case.channels[c][1]})": case.channels[c][0] * value for c, value in rms.items()}
     return {
         "verdict": diagnosis.verdict,

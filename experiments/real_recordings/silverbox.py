@@ -111,7 +111,7 @@ def report(out: Path) -> dict:
 
 
 def whole_tests(vehicle: AbstractVehicle, split: dict[str, Recording]) -> dict[str, float]:
-    """Free-run simulation error by the benchmark's three metrics."""
+    """Open-loop simulation error by the benchmark's three metrics."""
     multisine, arrow = (free_run_error(vehicle, split[part]) for part in ("test_multisine", "test_arrow"))
     rms = lambda error: 1e3 * float(np.sqrt(np.mean(error[_SKIPPED:] ** 2)))
     return {"multisine": rms(multisine), "arrow": rms(arrow), "arrow within range": rms(arrow[:_WITHIN])}

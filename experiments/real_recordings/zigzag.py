@@ -146,7 +146,7 @@ def report(out: Path) -> dict:
 
 
 def fit_percent(diagnosis: Conclusions, which: str) -> dict[str, float]:
-    r"""$100(1-\lVert y-\hat y\rVert/\lVert y-\bar y\rVert)$ by channel over all held-out runs."""
+    r"""$100(1-\lVert y-\hat y\rVert/\lVert y-\bar y\rVert)$ by channel over all test runs."""
     found = {}
     for channel in diagnosis.overlays[0].measured:
         measured = [o.measured[channel] for o in diagnosis.overlays]

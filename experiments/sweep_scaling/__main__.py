@@ -92,14 +92,14 @@ def agreement(out: Path, quick: bool) -> dict:
     size, stores = sizes(quick)[-1], out / "stores"
     other = stores / "other_chunks" / str(size)
     sweep(dataclasses.replace(plan(quick, size), width=[_OTHER]), other)
-    base, told = open_sweep(stores / ENGINES[0] / str(size)), {}
+    base, gaps = open_sweep(stores / ENGINES[0] / str(size)), {}
     for name in (*ENGINES[1:], "other_chunks"):
         found = open_sweep(stores / name / str(size))
-        told[name] = {number: _difference(base[number].values, found[number].values) for number in _NUMBERS}
-        told[name]["to_the_last_digit"] = float(np.mean(base.cost.values == found.cost.values))
-        told[name]["cost_to_a_millionth"] = float(np.mean(np.isclose(base.cost, found.cost, rtol=1e-6, atol=0.0)))
-        told[name]["outcomes_differ"] = int(np.sum(base.outcome.values != found.outcome.values))
-    return {"searches": size, "successful": float(np.mean(base.outcome.values == 0)), "against_one_device": told}
+        gaps[name] = {number: _difference(base[number].values, found[number].values) for number in _NUMBERS}
+        gaps[name]["to_the_last_digit"] = float(np.mean(base.cost.values == found.cost.values))
+        gaps[name]["cost_to_a_millionth"] = float(np.mean(np.isclose(base.cost, found.cost, rtol=1e-6, atol=0.0)))
+        gaps[name]["outcomes_differ"] = int(np.sum(base.outcome.values != found.outcome.values))
+    return {"searches": size, "successful": float(np.mean(base.outcome.values == 0)), "against_one_device": gaps}
 
 
 def _difference(one: np.ndarray, other: np.ndarray) -> float | None:

@@ -17,16 +17,18 @@ def draw(out: Path, quick: bool) -> dict:
     read = lambda name: json.loads((out / "parts" / f"{name}.json").read_text(encoding="utf-8"))
     figure, (time, memory) = plt.subplots(1, 2, figsize=(10.5, 4.2), layout="constrained")
     for name, colour in _COLOURS.items():
-        told = read(name)
-        label = f"{name.replace('_', ' ')}: {told['searches_a_second'][-1]:.1f} a second, slope {told['slope']:.2f}"
-        time.loglog(told["searches"], told["seconds"], "o-", ms=4, color=colour, label=label)
+        found = read(name)
+        label = f"{name.replace('_', ' ')}: {found['searches_a_second'][-1]:.1f} a second, slope {found['slope']:.2f}"
+        time.loglog(found["searches"], found["seconds"], "o-", ms=4, color=colour, label=label)
     time.set_xlabel("searches")
     time.set_ylabel("time, s, compiled")
     time.legend(fontsize=8)
-    told = read("memory")
-    label = f"8 lanes, slope {told['slope_by_samples']:.2f}"
-    memory.loglog(told["samples"], np.array(told["bytes_by_samples"]) / 1e6, "o-", ms=4, color="#1f4e79", label=label)
-    memory.loglog(told["samples"], np.array(told["bound_by_samples"]) / 1e6, "k:", lw=1, label="what the sweep reckons")
+    found = read("memory")
+    label = f"8 lanes, slope {found['slope_by_samples']:.2f}"
+    memory.loglog(found["samples"], np.array(found["bytes_by_samples"]) / 1e6, "o-", ms=4, color="#1f4e79", label=label)
+    memory.loglog(
+        found["samples"], np.array(found["bound_by_samples"]) / 1e6, "k:", lw=1, label="what the sweep reckons"
+    )
     memory.set_xlabel("samples of a run")
     memory.set_ylabel("memory of one pool, MB")
     memory.legend(fontsize=8)

@@ -49,7 +49,7 @@ def diagnose(
     runs, which are simulated once after the last decision; without them they are the last recording, or the last 30 %
     of a single one. `effects` are the classes that may be named, by default `js.vocabulary()`. Where rivals remain and
     a `manoeuvre` is wanted, inputs that separate them are looked for. After `budget` seconds no further effect is
-    tried, and the answer so far is given. `progress` is told what is being done.
+    tried, and the answer so far is given. `progress` is called with a line on what is being done.
 
     **Raises** `InputError` where nothing is free, for recordings that cannot be used, and where the model does not run
     from its values or diverges along the recordings.
@@ -152,8 +152,8 @@ class Diagnosis(AbstractResult):
         if found is None:
             return self
         advice = f"{self.conclusions.next_manoeuvre}. {said(found, NEXT_RUN)}"
-        told = dataclasses.replace(self.conclusions, next_manoeuvre=advice)
-        return dataclasses.replace(self, conclusions=told, next_run=found.recording)
+        advised = dataclasses.replace(self.conclusions, next_manoeuvre=advice)
+        return dataclasses.replace(self, conclusions=advised, next_run=found.recording)
 
     def brief(self) -> Parts:
         """The verdict, the numbers of the effects, and the errors on the test runs."""

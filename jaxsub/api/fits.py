@@ -97,7 +97,7 @@ def fitted(
 ) -> "Fit":
     """The fit of `vehicle`, which may be from a `file`, to checked runs from `sources`, by `names`.
 
-    `passes` is told as by `estimate.fit`. **Raises** `InputError` where the model does not run, and where one run has
+    `passes` is called as by `estimate.fit`. **Raises** `InputError` where the model does not run, and where one run has
     to show how much a number differs by run.
     """
     require_runs(vehicle, len(runs.times), file or vehicle.layout.name)
@@ -180,12 +180,12 @@ class Fit(AbstractResult):
         return self.identifiability is not None and self.coloured is not None
 
     def identified(self, watch: Any = lambda share: None) -> "Fit":
-        """The same with what the runs identify. `watch` is told the share of the samples that is done."""
+        """The same with what the runs identify. `watch` is called with the share of the samples that is done."""
         said = determined(self.solution, self.assessment, watch) if self.identifiability is None else None
         return dataclasses.replace(self, identifiability=said or self.identifiability)
 
     def allowing_colour(self, watch: Any = lambda share: None) -> "Fit":
-        """The same with standard errors that allow for coloured residuals. `watch` is told as by `identified`."""
+        """The same with standard errors that allow for coloured residuals. `watch` is called as by `identified`."""
         return dataclasses.replace(self, coloured=coloured_covariance(self.solution, None, watch))
 
     @cached_property
@@ -230,12 +230,12 @@ class Fit(AbstractResult):
         """The verdict, the channels, what the runs identify, and the coefficients."""
         full = self.completed
         assert full.identifiability is not None
-        return full.told()
+        return full.parts_so_far()
 
-    def told(self) -> Parts:
-        """As `parts`, by what was asked so far."""
+    def parts_so_far(self) -> Parts:
+        """As `parts`, of what has been computed so far."""
         said = self.identifiability
-        sentences = said.sentences() if said else ["What the recordings identify was not asked: interrupted."]
+        sentences = said.sentences() if said else ["Identifiability was not computed: interrupted."]
         differing = [self.variation_table()] if self.variations else []
         sentences += [variation.sentence() for variation in self.variations]
         return [*self._headline(), self.channel_table(), *sentences, self.coefficient_table(), *differing]

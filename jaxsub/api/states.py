@@ -75,7 +75,7 @@ class States(AbstractResult):
     estimates: tuple[Estimate, ...]
 
     def whitened(self, run: int) -> np.ndarray:
-        """(K, c) innovations of a run in their standard deviations by the filter, NaN where missing or refused."""
+        """(K, c) innovations of a run in the filter's standard deviations, NaN where missing or outside the gate."""
         found = self.estimates[run]
         return np.where(found.used, found.innovation / np.asarray(found.innovation_std), np.nan)
 

@@ -51,7 +51,8 @@ def sweep(
     together or, with `apart`, each on its own. Guesses are drawn within ± `spread` of each coefficient's value. With
     `noise_seeds` the recordings are answers of a fitted vehicle with noise drawn that often: a bootstrap. `compiled`
     searches by C made of the model. What is done is kept in `folder`, where the same call goes on; without one in a
-    temporary folder. `cluster` is the address of a Dask scheduler, or `local`. `progress` is told the searches done.
+    temporary folder. `cluster` is the address of a Dask scheduler, or `local`. `progress` is called with the number of
+    searches done and that of all.
 
     **Raises** `InputError` where nothing is free, for recordings that cannot be used, for what a plan cannot be and for
     a folder that holds something else.
@@ -182,9 +183,9 @@ class Sweep(AbstractResult):
 
         columns = ("file_value", "best", "standard_error", "unit")
         rows = [
-            (case["vehicle"], case["recording"], name, *(told[column] for column in columns))
+            (case["vehicle"], case["recording"], name, *(numbers[column] for column in columns))
             for case in self.cases
-            for name, told in case["coefficients"].items()
+            for name, numbers in case["coefficients"].items()
         ]
         index = ["vehicle", "recording", "coefficient"]
         return pandas.DataFrame(rows, columns=[*index, *columns]).set_index(index)
@@ -232,13 +233,13 @@ def _lines(case: dict[str, Any]) -> list[str]:
 
 
 def _coefficients(case: dict[str, Any]) -> Table:
-    bootstrap = any("spread_over_noise" in told for told in case["coefficients"].values())
+    bootstrap = any("spread_over_noise" in numbers for numbers in case["coefficients"].values())
     heads, rows = ["coefficient", "best", "standard error", "5 to 95 % of ends"], []
-    for name, told in case["coefficients"].items():
-        ends = told["percentiles_5_50_95"]
+    for name, numbers in case["coefficients"].items():
+        ends = numbers["percentiles_5_50_95"]
         reach = f"{ends[0]:.6g} to {ends[2]:.6g}" if ends else "none"
-        row = [name, _said(told["best"], 6), _said(told["standard_error"], 2), reach]
-        rows.append([*row, *([_said(told["spread_over_noise"], 2)] if bootstrap else [])])
+        row = [name, _said(numbers["best"], 6), _said(numbers["standard_error"], 2), reach]
+        rows.append([*row, *([_said(numbers["spread_over_noise"], 2)] if bootstrap else [])])
     return Table([*heads, *(["spread over noise"] * bootstrap)], rows)
 
 

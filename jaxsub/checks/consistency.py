@@ -30,21 +30,21 @@ def consistency(recording: Recording, layout: Layout, columns: Mapping[str, np.n
     rows = _rows(len(recording.times))
     looked_at = motions.replaced({name: values[rows] for name, values in motions.columns.items()})
     search = Search(recording.times[rows], looked_at, relations, layout.length or _REACH)
-    findings, told, named = [], set(), set()
+    findings, explained, named = [], set(), set()
     for _ in range(_MOST):
         best = search.best(named)
         if best is None:
             break
         mend, relation = best
         findings.append(explanation(recording, mend, relation, search.distance(relation, mend)))
-        told |= relation.among
+        explained |= relation.among
         search = search.mended(mend)
         named.add((mend.kind, mend.channels))
     # what a fault does to others is no contradiction of its own
     return findings + [
         contradiction(recording, relation, found)
         for relation in relations
-        if not told & relation.among and relation.exact and (found := search.contradicts(relation)) is not None
+        if not explained & relation.among and relation.exact and (found := search.contradicts(relation)) is not None
     ]
 
 

@@ -11,7 +11,7 @@ from ..recording import Recording
 def duplicates(runs: Sequence[Recording], held_out: Sequence[Recording] = ()) -> list[Finding]:
     """An error for each run whose samples are those of an earlier one, whatever the files are called.
 
-    A run that is fitted and held out is judged by what it was fitted to; one that is fitted twice counts twice.
+    A run that is fitted and tested is judged by what it was fitted to; one that is fitted twice counts twice.
     """
     findings, seen = [], {}
     for index, recording in enumerate([*runs, *held_out]):

@@ -1,4 +1,4 @@
-"""Inputs that do not move in any run, and the coefficients that the runs therefore cannot tell."""
+"""Inputs that do not move in any run, and the coefficients that the runs therefore do not identify."""
 
 from collections.abc import Sequence
 
@@ -24,9 +24,9 @@ def idle_inputs(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> li
         if not values or max(float(part.max()) for part in values) > min(float(part.min()) for part in values):
             continue
         lost = _through(vehicle, index)
-        # a constant acts too, but cannot be told from a constant force
-        told = f": these runs cannot tell {', '.join(lost)}" if lost else ""
-        what = f"the input {name} (column {column!r}) is {amount(float(values[0][0]))} in all runs{told}"
+        # a constant acts too, but is indistinguishable from a constant force
+        unidentified = f": these runs do not identify {', '.join(lost)}" if lost else ""
+        what = f"the input {name} (column {column!r}) is {amount(float(values[0][0]))} in all runs{unidentified}"
         remedy = f"move {name}, or fix {'these coefficients' if lost else 'what acts through it'}"
         findings.append(Finding("input-at-rest", "warning", layout.name, what, remedy, column))
     return findings

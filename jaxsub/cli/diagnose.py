@@ -95,7 +95,7 @@ def answered(
     Arguments are as of `api.diagnoses.diagnosed`; where rivals remain and a `manoeuvre` is wanted, it is looked for.
     """
     watch = options().watch
-    with terminal.progress(f"diagnosing {vehicle.layout.name}") as told, ExitStack() as kept:
+    with terminal.progress(f"diagnosing {vehicle.layout.name}") as progress, ExitStack() as kept:
 
         def keep_and_heed(found: Diagnosis) -> None:
             keep(found)
@@ -105,13 +105,13 @@ def answered(
 
         stop = lambda: watch is not None and watch.interrupted
         found = diagnosed(
-            vehicle, train, test, kinds, budget=budget, progress=told, stop=stop, keep=keep_and_heed, begin=begin
+            vehicle, train, test, kinds, budget=budget, progress=progress, stop=stop, keep=keep_and_heed, begin=begin
         )
         kept.close()
         if not (manoeuvre and found.undecided):
             return found
         keep(found)
-        return found.with_next_run(train, told)
+        return found.with_next_run(train, progress)
 
 
 def emit(answer: Diagnosis, explain: bool = False) -> None:

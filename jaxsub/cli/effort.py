@@ -43,7 +43,7 @@ _COMPILED_EVENT = "/jax/core/compile/backend_compile_duration"
 
 @functools.cache
 def return_memory() -> None:
-    """Let memory go back to the system once it is freed, where the C library can be told to.
+    """Let memory go back to the system once it is freed, where the C library can do so.
 
     glibc keeps blocks of up to 32 MB, which a million samples of a channel are, and what the compiler freed among what
     it keeps: 0.3 GB after one large program.
@@ -90,11 +90,11 @@ class Effort:
 class TimeLeft:
     """Says how many passes over long runs are done, how many are expected, and how long those will take.
 
-    `told` takes the line, which begins with `what`. Nothing is said in the first seconds, nor too often.
+    `show` takes the line, which begins with `what`. Nothing is said in the first seconds, nor too often.
     """
 
-    def __init__(self, told: Callable[[str], object], what: str):
-        self._told, self._what = told, what
+    def __init__(self, show: Callable[[str], object], what: str):
+        self._show, self._what = show, what
         self._begun = self._said = time.monotonic()
         self._from: tuple[float, float] | None = None
         self._every = _TERMINAL if terminal.console.is_terminal else _PIPE
@@ -111,7 +111,7 @@ class TimeLeft:
             return
         self._said = now
         left = (now - before) * max(expected - done, 0.0) / (done - already)
-        self._told(f"{self._what}: {done:.1f} of about {expected:.0f} passes over the samples, {_span(left)} left")
+        self._show(f"{self._what}: {done:.1f} of about {expected:.0f} passes over the samples, {_span(left)} left")
 
 
 def _span(seconds: float) -> str:

@@ -46,20 +46,20 @@ def run(
         effort = Effort(vehicle, stacked)
         if announcement := effort.announcement():
             terminal.note(announcement)
-        with terminal.progress(f"identifying {vehicle.layout.name}") as told:
-            told(f"fitting by {method}")
-            left = TimeLeft(told, f"fitting by {method}")
+        with terminal.progress(f"identifying {vehicle.layout.name}") as progress:
+            progress(f"fitting by {method}")
+            left = TimeLeft(progress, f"fitting by {method}")
             found = fitted(vehicle, stacked, list(map(str, runs)), names, method, file=str(vehicle_path), passes=left)
             _keep(found, fresh, out)
-            told(_FOLLOWS)
-            identified = _followed(found, TimeLeft(told, _FOLLOWS))
-        terminal.emit(identified.to_json(), lambda: terminal.show(identified.told()))
+            progress(_FOLLOWS)
+            identified = _followed(found, TimeLeft(progress, _FOLLOWS))
+        terminal.emit(identified.to_json(), lambda: terminal.show(identified.parts_so_far()))
         terminal.warn(identified.warnings)
         with fresh() as folder:
             identified.write(folder)
             if drawn and identified.complete:
-                with terminal.progress(f"identifying {vehicle.layout.name}") as told:
-                    told("drawing from the posterior")
+                with terminal.progress(f"identifying {vehicle.layout.name}") as progress:
+                    progress("drawing from the posterior")
                     _write_posterior(posterior(found.solution), folder / "posterior.nc")
     if not identified.complete:
         options().kept = f"{out} holds the fit, and what followed it so far"

@@ -27,16 +27,16 @@ def run(log_path: Path, sensors_path: Path, out: Path, overwrite: bool, referenc
         log = load_sensors(log_path, suite)
         truth = None if reference is None else load(reference)
         terminal.warn(log.findings)
-        with terminal.progress(f"navigating by {suite.name}") as told:
-            told(_STEPS)
-            found = navigate(log, suite, TimeLeft(told, _STEPS))
+        with terminal.progress(f"navigating by {suite.name}") as progress:
+            progress(_STEPS)
+            found = navigate(log, suite, TimeLeft(progress, _STEPS))
         terminal.warn(found.rows.findings)
         content = summary(found) | {"errors": {} if truth is None else reference_errors(found, truth)}
         terminal.emit(content, lambda: _show(content))
-        with terminal.progress("writing") as told:
-            told("recordings")
+        with terminal.progress("writing") as progress:
+            progress("recordings")
             _write(found, content, folder)
-            told("the report")
+            progress("the report")
             write_navigation_report(found, content, folder)
 
 

@@ -63,7 +63,7 @@ class Name(click.Choice):
 
 
 class Commands(click.Group):
-    """Commands of which a mistyped one is told its nearest neighbour."""
+    """Commands; the error for a mistyped one names the nearest."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

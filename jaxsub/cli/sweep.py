@@ -100,7 +100,7 @@ def _findings(summary: dict[str, Any]) -> list[Finding]:
     """A warning for each case whose best estimate does not explain its runs."""
     warning = lambda where, what: Finding("unexplained-runs", "warning", where, what)
     titled = {f"{case['vehicle']} on {case['recording']}": case["assessment"] for case in summary["cases"]}
-    return [warning(title, told["verdict"]) for title, told in titled.items() if not told["explains"]]
+    return [warning(title, found["verdict"]) for title, found in titled.items() if not found["explains"]]
 
 
 def _require_unchanged(folder: Path) -> None:

@@ -92,7 +92,7 @@ def progress(title: str) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def counted(title: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar that is told how many are done of how many; on a pipe, a line for each further tenth."""
+    """A bar that is called with how many are done of how many; on a pipe, a line for each further tenth."""
     if not console.is_terminal or options().quiet:
         shown = [-1]
 

@@ -88,8 +88,8 @@ class Autopilot(eqx.Module):
         """The memory and the deflections (rad) by fin, `dt` s after the last.
 
         `shown` are measured channels, of which it needs `channels`; `reference` holds `course_rate` (rad/s), `depth`
-        (m) and `roll` (rad), those that there is an autopilot for. A fin in `override` is told that deflection
-        instead; it keeps its limits.
+        (m) and `roll` (rad), those that there is an autopilot for. A fin in `override` is commanded that
+        deflection instead; it keeps its limits.
         """
         errors, asked, cut, depth = {}, {}, {}, memory.depth
         if self.course is not None:
@@ -104,8 +104,8 @@ class Autopilot(eqx.Module):
         if self.roll is not None:
             errors["roll"] = reference["roll"] - shown["phi"]
             asked["roll"] = self.roll.loop.demand(errors["roll"], memory.held["roll"], shown["p"])
-        told = self._shared(asked) | dict(override or {})
-        done = {name: fin.apply(told[name], memory.deflections[name], dt) for name, fin in self.limits.items()}
+        commanded = self._shared(asked) | dict(override or {})
+        done = {name: fin.apply(commanded[name], memory.deflections[name], dt) for name, fin in self.limits.items()}
         cut |= {name: demand - self._achieved(done)[name] for name, demand in asked.items()}
         held = memory.held | {
             name: loop.integrate(memory.held[name], errors[name], cut[name], dt) for name, loop in self._loops().items()

@@ -36,7 +36,7 @@ class PlantProcess(AbstractProcess):
 
 
 def observer(plant: Plant, sigma: Float[Array, " c"], strength: float = 1.0) -> ExtendedKalmanFilter:
-    """A filter of the plant's state by sensors of noise `sigma` (SI), told no more than that noise.
+    """A filter of the plant's state by sensors of noise `sigma` (SI), which knows no more than that noise.
 
     The vehicle's states stray as `filter.vehicle_filter` lets them, times `strength`; what actuators and sensors
     remember follows from commands and does not.

@@ -65,8 +65,8 @@ def pursue(
     layout = truth.vehicle.layout
     sigma = np.array([output.sigma or 0.0 for output in layout.outputs])
     draws = noise * sigma * np.random.default_rng([seed, 0]).standard_normal((len(table), len(sigma)))
-    told = jnp.asarray(np.where(sigma > 0.0, sigma, 1e-3))
-    follower = observer(mpc.plant, told)
+    assumed = jnp.asarray(np.where(sigma > 0.0, sigma, 1e-3))
+    follower = observer(mpc.plant, assumed)
     own = at_rest(truth.vehicle, 1)[0] if start is None else start
     u = mpc.weights.rest
     x = truth.start(own, u)

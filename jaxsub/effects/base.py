@@ -98,7 +98,7 @@ class AbstractEffect(eqx.Module):
         return {field.name: field.metadata["unit"] for field in number_fields(self)}
 
     def prior_std(self) -> dict[str, float]:
-        """How far from zero numeric fields are before the data, one standard deviation, where that is known."""
+        """Prior standard deviations of numeric fields about zero, SI, where they are known."""
         return {}
 
     def signs(self) -> dict[str, int]:

@@ -14,7 +14,7 @@ from .motion import FINS, FORCES, Facts
 class PropellerTorque(AbstractDerivative):
     r"""Roll reaction of the propeller: $K = K_{nn}|n|n$ with recorded shaft speed, else a constant $K_Q$.
 
-    At constant rpm this cannot be told from a trim offset or an asymmetric hull. Source: Fossen (2021), §9.5.
+    At constant rpm this is indistinguishable from a trim offset or an asymmetric hull. Source: Fossen (2021), §9.5.
     """
 
     name: ClassVar[str] = "propeller-torque"

@@ -20,7 +20,7 @@ KNOTS = 12
 class SmoothForce(AbstractForce):
     r"""A force that is a piecewise line in one variable: $\tau_i = \sum_j a_j\,\Lambda_j(x)$.
 
-    $\Lambda_j$ are hat functions at `KNOTS` equidistant places from `low` to `high`; beyond them the force is that at
+    $\Lambda_j$ are linear B-splines at `KNOTS` equidistant places, `low` to `high`; beyond them the force is that at
     the end. It describes and does not explain: it is no candidate, and joins a model whose mismatch has no name. Each
     a_j is Gaussian about zero before the data, of standard deviation `spread`, N or N m: so what a coefficient can do,
     such as damping what a line through the knots can, is left to it.

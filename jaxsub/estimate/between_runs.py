@@ -147,7 +147,7 @@ class Mixed:
 
     - `gram`: (R, q, q) products of each run's whitened columns: by the p coefficients (in their own sizes), by its
       initial state in its spread, and the error where that initial state is the guess.
-    - `prior`: (p+1, p+1) the same of the priors. `varied`: indices of the states whose spread is asked for.
+    - `prior`: (p+1, p+1) the same of the priors. `varied`: indices of the states whose standard deviation is needed.
     """
 
     gram: Float[np.ndarray, "r q q"]

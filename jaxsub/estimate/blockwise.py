@@ -78,7 +78,7 @@ class GaussNewton(Iterative):
         outputs: Float[Array, "n r k c"] | None = None,
         passes: Passes | None = None,
     ) -> Found:
-        """As `Iterative.run`. `passes` is told of passes over all samples: how many are done and how many expected."""
+        """As `Iterative.run`. `passes` is called with the passes over all samples done, and those expected."""
         if len(starts) > 1 or outputs is not None or problem.march is not None:
             return super().run(problem, starts, outputs)
         return raced([Descent(self, problem, np.asarray(starts)[0])], passes or unwatched).found

@@ -38,7 +38,7 @@ class Chain(AbstractMethod):
 class Global(AbstractMethod):
     """Differential evolution in a box about the problem's origin, then a local method from the best member.
 
-    The paper asks for a genetic algorithm; this is its descendant for real numbers. Where the search starts plays no
+    The paper uses a genetic algorithm; this is its descendant for real numbers. Where the search starts plays no
     part, except that it is one member of the population. Not to be called inside `jit`.
 
     **Fields**

@@ -66,8 +66,8 @@ class Arrow(eqx.Module):
         left, right, _, own = self._eliminated(gradient, jnp.zeros(()))
         values, vectors = eigh(left)
         # what was taken off is exact to the rounding of a diagonal of ones
-        told = values > _FLAT * jnp.maximum(jnp.max(values, initial=0.0), 1.0)
-        squares = jnp.where(told, (vectors.T @ right) ** 2 / jnp.where(told, values, 1.0), 0.0)
+        curved = values > _FLAT * jnp.maximum(jnp.max(values, initial=0.0), 1.0)
+        squares = jnp.where(curved, (vectors.T @ right) ** 2 / jnp.where(curved, values, 1.0), 0.0)
         return 0.5 * (jnp.sum(self._split(gradient)[1] * own) + jnp.sum(squares))
 
     def _split(self, vector: Shaped[Array, " d"]) -> tuple[Shaped[Array, " p"], Shaped[Array, "r s"]]:
@@ -115,8 +115,8 @@ class Spectrum(eqx.Module):
         Infinite where the curvature is not that of a minimum: there is more to gain than a full step promises.
         """
         size = jnp.abs(self.values)
-        told = size > _FLAT * jnp.max(size, initial=0.0)
-        full = 0.5 * jnp.sum(jnp.where(told, (self.vectors.T @ gradient) ** 2 / jnp.where(told, size, 1.0), 0.0))
+        curved = size > _FLAT * jnp.max(size, initial=0.0)
+        full = 0.5 * jnp.sum(jnp.where(curved, (self.vectors.T @ gradient) ** 2 / jnp.where(curved, size, 1.0), 0.0))
         return jnp.where(self.negative, jnp.inf, full)
 
     @property

@@ -182,7 +182,7 @@ def search(
     false keeps the vehicle and finds the initial states alone, as for a run that the fit did not see.
     Noise comes from `sigma`, else from the vehicle file; channels whose noise is to be estimated have it concentrated
     out: fit, take the rms, fit again from there, until it settles. So have numbers that differ by run their standard
-    deviation between runs, where the vehicle knows none and may move. `passes` is told as by `AbstractMethod.run`.
+    deviation between runs, where the vehicle knows none and may move. `passes` is called as by `AbstractMethod.run`.
 
     **Raises** `InputError` where that is to be estimated from one run.
     """
@@ -262,7 +262,7 @@ def fit(
     the more probable is taken. The simulation of an unstable model diverges, while a filter follows the
     measurements, and its estimates allow for missing physics. `sigma` overrides the file's noise; `start` is
     where the initial states' search begins, or with `known_start` what they are. A failure is a value in
-    `Solution.result`, no exception. `passes` is told how many passes over long runs are done and expected
+    `Solution.result`, no exception. `passes` is called with how many passes over long runs are done and expected
     (`AbstractMethod.run`).
     """
     runs = recordings if isinstance(recordings, Runs) else batch(vehicle, recordings)
@@ -299,7 +299,7 @@ def _improbable(found: Solution) -> float:
 
 
 def evaluate(ended: AbstractSearchEnd, watch: Watch = nobody) -> Solution:
-    """The statistics of an end; itself where it has them. `watch` is told the share of the samples that is done."""
+    """The statistics of an end; itself where it has them. `watch` is called with the share of samples done."""
     if isinstance(ended, Solution):
         return ended
     problem = ended.problem

@@ -30,12 +30,12 @@ _PART_OF_ACCELERATOR, _LANES_OF_ACCELERATOR = 0.5, 256
 _TURNS = 16
 
 
-# told the passes over all samples that are done, and how many are expected
+# called with the passes over all samples that are done, and how many are expected
 Passes = Callable[[float, float], object]
 
 
 def unwatched(done: float, expected: float) -> None:
-    """Passes that nobody is told of."""
+    """Does nothing: progress that nobody watches."""
 
 
 @runtime_checkable
@@ -223,5 +223,5 @@ def _cores() -> int:
 
 def _room() -> tuple[float, int]:
     """Bytes and lanes that a pool may have, on the device that JAX picks."""
-    told = None if jax.default_backend() == "cpu" else jax.local_devices()[0].memory_stats()
-    return (_PART_OF_ACCELERATOR * told["bytes_limit"], _LANES_OF_ACCELERATOR) if told else (_MEMORY, _LANES)
+    stats = None if jax.default_backend() == "cpu" else jax.local_devices()[0].memory_stats()
+    return (_PART_OF_ACCELERATOR * stats["bytes_limit"], _LANES_OF_ACCELERATOR) if stats else (_MEMORY, _LANES)

@@ -114,7 +114,7 @@ def posterior(found: Solution, *, draws: int = 1000, warmup: int = 300, chains: 
     target = Target.of(found)
     key, starts = jax.random.split(jax.random.key(seed))
     begin = scattered_starts(target, starts, chains)
-    samples, told = _chains(target, jax.random.split(key, chains), begin, warmup, draws)
+    samples, statistics = _chains(target, jax.random.split(key, chains), begin, warmup, draws)
     theta, states, sigma = jax.jit(jax.vmap(jax.vmap(target.drawn)))(samples)
     values = {name: np.asarray(theta[..., i]) for i, name in enumerate(found.names)}
     if not found.known_start:
@@ -122,7 +122,7 @@ def posterior(found: Solution, *, draws: int = 1000, warmup: int = 300, chains: 
     if any(target.estimated):
         values["sigma"] = np.asarray(sigma)[..., np.flatnonzero(target.estimated)]
     channels = [c for c, estimated in zip(found.vehicle.layout.channels, target.estimated, strict=True) if estimated]
-    data = _from_dict(arviz, values, {name: np.asarray(field) for name, field in told.items()}, channels)
+    data = _from_dict(arviz, values, {name: np.asarray(field) for name, field in statistics.items()}, channels)
     for row in found.vehicle.layout.free:
         data["posterior"][row.name].attrs["units"] = row.unit
     return data
@@ -146,8 +146,8 @@ def _chains(
 
         def step(state: Any, _: None) -> tuple[Any, tuple[Array, dict[str, Array]]]:
             state = advance(state)
-            told = {"diverging": state.diverging, "lp": -state.potential_energy, "n_steps": state.num_steps}
-            return state, (state.z, told | {"acceptance_rate": state.accept_prob})
+            statistics = {"diverging": state.diverging, "lp": -state.potential_energy, "n_steps": state.num_steps}
+            return state, (state.z, statistics | {"acceptance_rate": state.accept_prob})
 
         _, kept = jax.lax.scan(step, state, length=warmup + draws)
         return jax.tree.map(lambda leaf: leaf[warmup:], kept)
@@ -174,10 +174,12 @@ def _arviz() -> Any:
         return optional("arviz", "bayes", "posterior")
 
 
-def _from_dict(arviz: Any, values: dict[str, np.ndarray], told: dict[str, np.ndarray], channels: list[str]) -> Any:
+def _from_dict(
+    arviz: Any, values: dict[str, np.ndarray], statistics: dict[str, np.ndarray], channels: list[str]
+) -> Any:
     """ArviZ 1 takes the groups as one dictionary, ArviZ 0 each by its own name."""
     labels = {"dims": {"initial_state": ["run", "state"], "sigma": ["channel"]}, "coords": {"channel": channels}}
-    groups = {"posterior": values, "sample_stats": told}
+    groups = {"posterior": values, "sample_stats": statistics}
     if int(arviz.__version__.partition(".")[0]) < 1:
         return arviz.from_dict(**groups, **labels)
     return arviz.from_dict(groups, **labels)

@@ -146,7 +146,7 @@ def _follow(simplex: _Simplex, cost: Float[Array, ""], tolerance: float) -> _Sim
 def _trial(
     corners: Array, costs: Array, pending: Array, phase: Array, reflected: Array, reflected_cost: Array
 ) -> Float[Array, " m"]:
-    """The point that `phase` asks for."""
+    """The point that `phase` needs."""
     high = jnp.argmax(costs)
     others = jnp.arange(len(costs)) != high
     centroid = jnp.sum(jnp.where(others[:, None], corners, 0.0), axis=0) / (len(costs) - 1)

@@ -30,8 +30,8 @@ class FilterState(eqx.Module):
     - `x`: (n,) state, of s ways to change. `theta`: (p,) parameters.
     - `joint`: what the filter's form keeps of the uncertainty of [x, θ]; `own`: of x were θ known, where it has that.
     - `memory`, `residuals`: of the process-noise rule.
-    - `outside`: (c,) how often each channel was outside the gate in a row, in agreement; `refused`: (c,) the innovation
-      of the last that was.
+    - `outside`: (c,) how often each channel was outside the gate in a row, in agreement; `rejected`: (c,) innovation of
+      the last that was.
     - `diverged`: whether a number ceased to be finite. The filter then stays at its last finite numbers.
     """
 
@@ -42,7 +42,7 @@ class FilterState(eqx.Module):
     memory: Any
     residuals: Residuals
     outside: Int[Array, " c"]
-    refused: Float[Array, " c"]
+    rejected: Float[Array, " c"]
     diverged: Bool[Array, ""]
 
 
@@ -52,7 +52,7 @@ class Estimate(eqx.Module):
     **Fields**
 
     - `x`, `theta`: estimates; `x_std`, `theta_std`: their standard deviations, the state's s of its changes.
-    - `innovation`: (c,) measured minus predicted, zero where missing or refused; `factor`: (c, c) lower-triangular
+    - `innovation`: (c,) measured minus predicted, zero where missing or rejected; `factor`: (c, c) lower-triangular
       factor of its covariance, parameters' uncertainty included: the whitened innovation is factor⁻¹ innovation.
     - `used`: (c,) true where measured and believed. `noise_std`: (s,) root of the process noise's variance in the
       interval before.
@@ -122,8 +122,8 @@ class AbstractFilter(eqx.Module):
         self, x: Float[Array, " n"], theta: Float[Array, " p"], joint: Float[Array, "q q"], diverged: Bool[Array, ""]
     ) -> FilterState:
         residuals = Residuals.none(self.x_root, self.R_root)
-        outside, refused = jnp.zeros(len(self.R_root), int), jnp.zeros(len(self.R_root), x.dtype)
-        begun = FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, outside, refused, diverged)
+        outside, rejected = jnp.zeros(len(self.R_root), int), jnp.zeros(len(self.R_root), x.dtype)
+        begun = FilterState(x, theta, joint, self.own(), self.noise.start(), residuals, outside, rejected, diverged)
         return _strong(begun)
 
     def before(self, state: FilterState, sample: Sample) -> tuple[FilterState, Innovation, Float[Array, "s m"]]:
@@ -169,7 +169,7 @@ class AbstractFilter(eqx.Module):
         return jnp.any(sample.mask & (state.outside > 0) & (state.outside == self.gate.patience))
 
     def _look(self, state: FilterState, sample: Sample) -> tuple[FilterState, Innovation]:
-        """What `sample` shows, what the gate refuses left out, and what the gate has seen so far."""
+        """What `sample` shows, what the gate rejects left out, and what the gate has seen so far."""
         process = self.process
         ways = jnp.zeros(len(self.x_root), state.x.dtype)
         observe = lambda change, theta: process.observe(process.moved(state.x, change), theta, sample)
@@ -182,11 +182,11 @@ class AbstractFilter(eqx.Module):
         inside, patient = self.gate.inside(innovation, deviations), state.outside < self.gate.patience
         mask = sample.mask & (inside | ~patient)
         # of two measurements that err independently the difference has twice the variance
-        agrees = self.gate.inside(process.innovation(innovation, state.refused), math.sqrt(2.0) * deviations)
+        agrees = self.gate.inside(process.innovation(innovation, state.rejected), math.sqrt(2.0) * deviations)
         longer = jnp.where(agrees | ~patient, state.outside + 1, 1)
         outside = jnp.where(sample.mask, jnp.where(inside, 0, longer), state.outside)
-        refused = jnp.where(sample.mask & ~inside, innovation, state.refused)
-        after = dataclasses.replace(state, outside=outside, refused=refused)
+        rejected = jnp.where(sample.mask & ~inside, innovation, state.rejected)
+        after = dataclasses.replace(state, outside=outside, rejected=rejected)
         return after, Innovation(jnp.where(mask, innovation, 0.0), mask, C, R_root, covariance)
 
 
@@ -239,7 +239,7 @@ def augmented_predict(
     after = lambda change, theta: process.step(process.moved(state.x, change), theta, sample)
     x, *jacobians = linearised(after, jnp.zeros(s, state.x.dtype), state.theta)
     # of the state's n numbers; of its ways to change
-    push = jax.linearize(lambda moved: process.apart(moved, x), x)[1]
+    push = jax.linearize(lambda moved: process.difference(moved, x), x)[1]
     by_all = jax.vmap(push, 1, 1)(jnp.concatenate(jacobians, axis=1))
     # The parameters' columns are not sliced off: with no parameters that is an empty slice of a concatenation, at which
     # XLA's front end on one core drops the calling convention of every LAPACK routine in the program.

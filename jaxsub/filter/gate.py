@@ -13,9 +13,9 @@ from jaxtyping import Array, Bool, Float
 class AbstractGate(eqx.Module):
     """Decides channel by channel, from how far a measurement lies from what was expected.
 
-    A filter that is wrong itself would refuse the truth for ever. A channel whose measurements were outside too often
+    A filter that is wrong itself would reject the truth for ever. A channel whose measurements were outside too often
     in a row, and agreed with each other, is believed until it is inside again; with the first of them the state becomes
-    as uncertain as at the start. Wild measurements do not agree, and are refused however many they are.
+    as uncertain as at the start. Wild measurements do not agree, and are rejected however many they are.
 
     **Fields**
 
@@ -57,7 +57,7 @@ class InnovationGate(AbstractGate):
     def of(
         cls, channels: int, false_rejection: float = 1e-6, patience: int = 5, dtype: DTypeLike | None = None
     ) -> "InnovationGate":
-        """The gate that refuses a measurement of a consistent filter with probability `false_rejection`.
+        """The gate that rejects a measurement of a consistent filter with probability `false_rejection`.
 
         By default 4.9 standard deviations: at ten measurements a second, one in a day of each channel.
         """

@@ -38,7 +38,7 @@ class ModifiedKalmanFilter(AbstractFilter):
         return dataclasses.replace(state, x=x, joint=joint, own=self.form.predict(state.own, F, G))
 
     def widened(self, state: FilterState, G: Float[Array, "s m"]) -> FilterState:
-        """Both filters are told."""
+        """The measurement update of both filters."""
         assert state.own is not None
         own = self.form.predict(state.own, jnp.eye(len(state.own), dtype=G.dtype), G)
         return dataclasses.replace(state, joint=augmented_widened(self, state, G), own=own)

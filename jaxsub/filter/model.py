@@ -17,7 +17,7 @@ class Sample(eqx.Module):
     - `inputs`: whatever the process takes.
     - `elapsed`: s since the sample before; zero at the first of a run and where padded: there no time passes.
     - `outputs`: (c,) measured channels; `mask`: (c,) true where measured.
-    - `scale`: (c,) noise of the channels in terms of what the filter was told; by default one.
+    - `scale`: (c,) noise of the channels in terms of what the filter assumes; by default one.
     """
 
     inputs: PyTree[Array]
@@ -46,8 +46,8 @@ class AbstractProcess(eqx.Module):
         """The state that lies `change` from `x`."""
         return x + change
 
-    def apart(self, x: Float[Array, " n"], origin: Float[Array, " n"]) -> Float[Array, " s"]:
-        """The change from `origin` to `x`: moved(origin, apart(x, origin)) is x."""
+    def difference(self, x: Float[Array, " n"], origin: Float[Array, " n"]) -> Float[Array, " s"]:
+        """The change from `origin` to `x`: moved(origin, difference(x, origin)) is x."""
         return x - origin
 
     def driven(

@@ -17,7 +17,7 @@ class Innovation(eqx.Module):
 
     **Fields**
 
-    - `value`: (c,) zero where missing or refused; `mask`: (c,) true elsewhere.
+    - `value`: (c,) zero where missing or rejected; `mask`: (c,) true elsewhere.
     - `C`: (c, q) Jacobian of the outputs by [x, θ]. `R_root`: (c, c) factor of the sensors' covariance.
     - `covariance`: (c, c) of the innovation, as if nothing was missing.
     """
@@ -34,7 +34,7 @@ class Residuals(eqx.Module):
 
     **Fields**
 
-    - `innovation`: (c,) zero where missing or refused; `mask`: (c,) true where used.
+    - `innovation`: (c,) zero where missing or rejected; `mask`: (c,) true where used.
     - `factor`: (c, c) lower-triangular factor of the innovation's covariance.
     - `gain`: (s, c) of the state; `correction`: (s,) gain times innovation.
     """

@@ -2,7 +2,7 @@ r"""The Rauch-Tung-Striebel smoother of a filter's run, block by block, so that 
 
 With $F_k$ the Jacobian of the step, $P_k$ the filter's covariance and $P^-_{k+1}$ the predicted one,
 $C_k = P_kF_k^T(P^-_{k+1})^{-1}$, $\hat x^s_k = \hat x_k + C_k(\hat x^s_{k+1} - \hat x^-_{k+1})$ and
-$P^s_k = P_k + C_k(P^s_{k+1} - P^-_{k+1})C_k^T$. Differences are changes of the state (`AbstractProcess.apart`).
+$P^s_k = P_k + C_k(P^s_{k+1} - P^-_{k+1})C_k^T$. Differences are changes of the state (`AbstractProcess.difference`).
 Source: Rauch, Tung and Striebel (1965), AIAA J. 3.
 """
 
@@ -77,7 +77,7 @@ def smooth_block(
 
     def back(known: Smoothed, passed: tuple[_Passed, Sample]) -> tuple[Smoothed, PyTree[Array]]:
         process, (step, sample) = filter.process, passed
-        change = process.apart(known.x, step.ahead)
+        change = process.difference(known.x, step.ahead)
         x = process.moved(step.x, step.C @ change)
         wide = known.covariance - step.root @ step.root.T
         P = step.P + step.C @ wide @ step.C.T
@@ -91,6 +91,8 @@ def _jacobian(filter: AbstractFilter, state: FilterState, sample: Sample) -> Flo
     """Of the change of the state across the interval before `sample`; the identity where no time passes."""
     process, s = filter.process, len(filter.x_root)
     following = process.step(state.x, state.theta, sample)
-    change = lambda ways, theta: process.apart(process.step(process.moved(state.x, ways), theta, sample), following)
+    change = lambda ways, theta: process.difference(
+        process.step(process.moved(state.x, ways), theta, sample), following
+    )
     F = linearised(change, jnp.zeros(s, state.x.dtype), state.theta)[1]
     return jnp.where(sample.elapsed > 0.0, F, jnp.eye(s, dtype=F.dtype))

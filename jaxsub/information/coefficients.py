@@ -38,7 +38,7 @@ class CoefficientEstimate:
 
 
 def estimates(fit: Solution, said: Identifiability | None, coloured: Coloured | None) -> list[CoefficientEstimate]:
-    """The coefficients of a fit; what was not asked, because the command was ended, is None.
+    """The coefficients of a fit; what was not computed, because the command was ended, is None.
 
     Where the residuals' disturbance could not be estimated, the standard errors for white noise are multiplied by the
     largest rms of a channel, if that is above one.

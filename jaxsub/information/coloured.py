@@ -48,7 +48,7 @@ def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, w
     """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed.
 
     The `disturbance` is estimated from the residuals where none is given. Coefficients at a bound are held there.
-    `watch` is told the share of both passes over the samples that is done.
+    `watch` is called with the share of both passes over the samples that is done.
     """
     problem, model = fit.problem, fit.model
     reduced = _reduced(problem, model.products, np.asarray(fit.pressed) != 0.0)
@@ -130,5 +130,5 @@ def _directions(information: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], 
     values, vectors = jnp.linalg.eigh(information / jnp.outer(scale, scale))
     eps = jnp.finfo(values.dtype).eps
     columns = vectors / jnp.sqrt(jnp.maximum(values, 50.0 * eps)) / scale[:, None]
-    told = values > 1e4 * eps
-    return jnp.where(told, columns, 0.0), jnp.where(told, 0.0, columns)
+    determined = values > 1e4 * eps
+    return jnp.where(determined, columns, 0.0), jnp.where(determined, 0.0, columns)

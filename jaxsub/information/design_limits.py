@@ -1,4 +1,4 @@
-r"""What a manoeuvre may ask of its actuators and its vehicle, and inputs that never ask for more.
+r"""Limits of a manoeuvre's actuators and motion, and inputs that keep the actuators' limits.
 
 An actuator follows a command $c_k$ as a servo of limited rate $\dot\delta_{max}$ does:
 $\delta_k = \delta_{k-1} + s_k\tanh\bigl((c_k - \delta_{k-1})/s_k\bigr)$ with $s_k = \dot\delta_{max}\Delta_k$. As
@@ -27,7 +27,7 @@ Range = float | tuple[float, float]
 
 @dataclasses.dataclass(frozen=True)
 class ManoeuvreLimits:
-    """What a manoeuvre may ask for, SI.
+    """Limits of a manoeuvre, SI.
 
     **Fields**
 

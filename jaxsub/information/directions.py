@@ -45,7 +45,7 @@ class Directions:
 
     @classmethod
     def of(cls, fit: Solution, watch: Watch = nobody) -> "Directions":
-        """The directions of a fit. `watch` is told the share of the samples that is done."""
+        """The directions of a fit. `watch` is called with the share of the samples that is done."""
         problem = fit.problem
         values, given = np.array(list(fit.values.values())), np.asarray(problem.prior_mean)
         size = np.maximum(np.abs(values), np.where(np.isfinite(given), np.abs(given), 0.0))
@@ -123,8 +123,8 @@ def _decompose(triangle: np.ndarray, largest: float | None = None) -> tuple[np.n
 
 def _inverse(singular: np.ndarray, largest: float) -> np.ndarray:
     """1 / singular, infinite where it is rounding beside the `largest`."""
-    told = singular > np.sqrt(np.finfo(singular.dtype).eps) * largest
-    return np.where(told, 1.0 / np.where(told, singular, 1.0), np.inf)
+    determined = singular > np.sqrt(np.finfo(singular.dtype).eps) * largest
+    return np.where(determined, 1.0 / np.where(determined, singular, 1.0), np.inf)
 
 
 def _spread(vectors: np.ndarray, uncertainty: np.ndarray) -> np.ndarray:

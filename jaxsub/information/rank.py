@@ -102,7 +102,7 @@ def identifiability(fit: Solution, assessment: Assessment | None = None, watch: 
     """The directions that a fit's recordings leave open, and a verdict on each coefficient.
 
     `assessment` says whether the fit explains its runs; it is made of the fit where none is given.
-    `watch` is told the share of the samples that is done.
+    `watch` is called with the share of the samples that is done.
     """
     if not fit.names:
         return Identifiability(0, 0, [], [])

@@ -49,7 +49,7 @@ class Directions(eqx.Module):
 
 
 def residual_disturbance(problem: Problem, model: BlockLinearised, directions: Directions, watch: Watch) -> Disturbance:
-    """The disturbance of the residuals of `model`. `watch` is told the share of long runs' samples that is done."""
+    """The disturbance of the residuals of `model`. `watch` is called with the share that is done."""
     runs, linearised = _windows(model)
     whole = runs.times.shape[1] == model.runs.times.shape[1]
     averages = () if whole else (_averages(problem, model, directions, watch),)

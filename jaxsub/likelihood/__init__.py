@@ -1,4 +1,4 @@
-"""Likelihoods: how probable a recording is under a model, and how that changes with everything in it."""
+"""Likelihoods: probability density of a recording under a model, and its derivatives."""
 
 from .averages import Averages, group_means
 from .blocks import BlockLinearised, Watch, block_length, nobody, output_errors, summed_products

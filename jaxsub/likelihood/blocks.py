@@ -24,7 +24,7 @@ from .sensitivity import Checkpoint, Jacobians, Linearised, along, with_jacobian
 # long, within 15 %, while memory grows by 0.1 MB a sample of a body in six degrees of freedom
 _SHORT, _AT_ONCE = 20_000, 2_000
 
-# told the share of a pass over all samples that is done
+# called with the share of a pass over all samples that is done
 Watch = Callable[[float], object]
 
 

@@ -274,7 +274,7 @@ def covariance_derivatives(
 ) -> Float[Array, "r k c m"]:
     r"""$\Gamma_i W$ with $\Gamma_i$ the derivatives of the residuals' covariance by log q, log τ and log κ, in order.
 
-    A pass backwards for the forces that `weights` ask for, and one forwards for what each force, correlated, shows.
+    A pass backwards for the forces that `weights` weigh, and one forwards for what each force, correlated, shows.
     """
     asked = _asked(system, weights[..., None])
     kept = lambda log_time: _correlated(jnp.exp(log_time), system.intervals, asked)[..., 0]
@@ -350,9 +350,9 @@ def smoothed(
 
     def back(carry: tuple[Array, Array], kept: tuple) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         lever, weight = carry
-        m, P, told, pull, left, F = kept
+        m, P, information, pull, left, F = kept
         through = left.T @ F.T
-        lever, weight = through @ lever - pull, told + through @ weight @ through.T
+        lever, weight = through @ lever - pull, information + through @ weight @ through.T
         mean, spread = m - P @ lever, jnp.diag(P - P @ weight @ P)
         return (lever, weight), (mean[s:], jnp.sqrt(jnp.maximum(spread[s:], 0.0)))
 

@@ -242,10 +242,10 @@ def _back_step(
     of_F = lever @ filtered[0].T + 2.0 * weight @ at.F @ filtered[1]
     of_B, of_forcing = 2.0 * weight @ at.B, None if at.forcing is None else -lever[:s]
     weight = weighed @ at.F
-    told, kept = gain @ left, gain @ weight
+    weighted, kept = gain @ left, gain @ weight
     pull = u @ both
-    of_E = told + pull
-    mixed = (told + 0.5 * pull) @ u.T
+    of_E = weighted + pull
+    mixed = (weighted + 0.5 * pull) @ u.T
     of_S = kept @ gain.T - 0.5 * (mixed + mixed.T) + 0.5 * spread * inverse
     of_across = (u @ left.T - 2.0 * kept).at[:, :s].add(of_S @ at.C)
     across = passed.factor @ passed.half

@@ -19,7 +19,7 @@ def portmanteau(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r
 def portmanteau_by_channel(
     white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r k c"]
 ) -> Float[np.ndarray, " c"]:
-    r"""How probable correlations over time as large as those of each channel of `white` are where there are none.
+    r"""p-value of correlations over time as large as those of each channel of `white`, under independence.
 
     $Q = \sum_{l\le L} (\sum_k e_k e_{k+l})^2 / \sum_k e_k^2 e_{k+l}^2$ is $\chi^2_L$ for innovations, whatever their
     variance; the least p-value over windows L, corrected for their number; 1 where there are too few samples.

@@ -1,8 +1,8 @@
 """Where a vehicle is and how it lies: attitude, position and strapdown filters, and streams that flight loops call."""
 
-from .ahead import Program, ahead_of_time, native
 from .alignment import Alignment, MagneticField, aligned
 from .attitude import Gyro, PaperAttitude, RotationAttitude
+from .compiled_step import Program, ahead_of_time, native
 from .constructed import (
     ConstructedAttitude,
     ConstructedAttitudeStream,

@@ -152,9 +152,9 @@ class AidedNavigation(AbstractProcess):
         inner = self.inertial.moved(x[:STRAPDOWN], change[: STRAPDOWN - 1])
         return jnp.concatenate([inner, x[STRAPDOWN:] + change[STRAPDOWN - 1 :]])
 
-    def apart(self, x: Float[Array, " n"], origin: Float[Array, " n"]) -> Float[Array, " s"]:
+    def difference(self, x: Float[Array, " n"], origin: Float[Array, " n"]) -> Float[Array, " s"]:
         """The rotation between the two, and the differences of the rest."""
-        inner = self.inertial.apart(x[:STRAPDOWN], origin[:STRAPDOWN])
+        inner = self.inertial.difference(x[:STRAPDOWN], origin[:STRAPDOWN])
         return jnp.concatenate([inner, x[STRAPDOWN:] - origin[STRAPDOWN:]])
 
     def step(self, x: Float[Array, " n"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " n"]:
@@ -171,7 +171,7 @@ class AidedNavigation(AbstractProcess):
         """
         inner = _scaled(x, sample)
         R, T = matrix(normalised(x[:4])), sample.elapsed
-        # what a scale error makes of gravity is a bias; what it makes of a motion comes and goes
+        # what a scale error makes of gravity is a bias; what it makes of a motion varies with that
         moving = inner.inputs.accelerometer + R.T @ self.inertial.gravity(x.dtype)
         read = Inertial(inner.inputs.gyro, moving, inner.inputs.magnetometer)
         inner = dataclasses.replace(inner, inputs=read)

@@ -94,7 +94,7 @@ class RotationAttitude(AbstractAttitude):
         turned = product(_unit(x[:4]), exponential(change[:3]))
         return jnp.concatenate([_unit(turned), x[4:] + change[3:]])
 
-    def apart(self, x: Float[Array, "7"], origin: Float[Array, "7"]) -> Float[Array, "6"]:
+    def difference(self, x: Float[Array, "7"], origin: Float[Array, "7"]) -> Float[Array, "6"]:
         """The rotation between the two, and the difference of the biases."""
         return jnp.concatenate([logarithm(product(conjugate(origin[:4]), x[:4])), x[4:] - origin[4:]])
 

@@ -101,7 +101,7 @@ def constructed_attitude(
     window = Window(fixes, times, accelerometer)
     velocity, across, forces, sound = _motion(window, limits)
     course, has_heading = _course(velocity, heading, limits)
-    # without a heading the direction of a horizontal acceleration in the body cannot be told
+    # without a heading the direction of a horizontal acceleration in the body is not known
     sideways = jnp.where(has_heading, across[:2], 0.0)
     has_level = sound & (has_heading | (length(*across[:2]) < limits.force))
     ahead = jnp.cos(course) * sideways[0] + jnp.sin(course) * sideways[1]

@@ -57,7 +57,7 @@ class Averaged(NamedTuple):
 
 
 def with_field(log: SensorLog, suite: SensorSuite) -> tuple[SensorLog, SensorSuite, FieldFit | None]:
-    """The log and its suite with the magnetometer's delay and hard iron taken off where the file asks for that.
+    """The log and its suite with the magnetometer's delay and hard iron taken off where the file requests that.
 
     A delay or a field that the motion does not show to 5 ms or 2 % of the field stays, and a finding says so.
     """

@@ -35,7 +35,7 @@ _BLOCK = 2048
 # linearises about it, and is too sure of the yaw and the delays that it then finds
 _ALIGNING, _ROUNDS = 20.0, 3
 
-Told = Callable[[float, float], object]
+Progress = Callable[[float, float], object]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -72,10 +72,10 @@ class _Seen(NamedTuple):
     used: Array
 
 
-def navigate(log: SensorLog, suite: SensorSuite, told: Told = lambda done, of: None) -> Navigation:
+def navigate(log: SensorLog, suite: SensorSuite, progress: Progress = lambda done, of: None) -> Navigation:
     """The motion that a log's readings show, filtered and smoothed.
 
-    `told` is given how many passes over the rows are done, and of how many. **Raises** `InputError` for a log without
+    `progress` is called with the passes over the rows that are done, and all. **Raises** `InputError` for a log without
     inertial readings, and where the filter breaks down.
     """
     log, suite, field = with_field(log, suite)
@@ -85,7 +85,7 @@ def navigate(log: SensorLog, suite: SensorSuite, told: Told = lambda done, of: N
     x = np.concatenate([start.x, np.zeros(len(late))])
     K, early = len(rows.times), int(np.searchsorted(rows.times, rows.times[0] + _ALIGNING, side="right"))
     rounds = 0 if start.rest or start.heading == "by fixes" else _ROUNDS
-    steps = _Steps(told, _cost(K) * (2 if late else 1) + rounds * _cost(early))
+    steps = _Steps(progress, _cost(K) * (2 if late else 1) + rounds * _cost(early))
     begin = filter.start(jnp.asarray(x), jnp.zeros(0), jnp.zeros((0, 0)))
     for _ in range(rounds):
         begin = _aligned(filter, _passes(filter, begin, rows, early, arm, steps).first)
@@ -165,13 +165,13 @@ def _cost(K: int) -> int:
 class _Steps:
     """Counts what is done, and tells of it."""
 
-    def __init__(self, told: Told, of: int):
-        self._told, self._of, self._done = told, of, 0
+    def __init__(self, progress: Progress, of: int):
+        self._progress, self._of, self._done = progress, of, 0
 
     def done(self, more: int) -> None:
         """So many more."""
         self._done += more
-        self._told(float(self._done), float(self._of))
+        self._progress(float(self._done), float(self._of))
 
 
 @compiled

@@ -102,11 +102,11 @@ class PaperNavigator(AbstractStream):
         return NavigatorState(construction, attitude, position), Navigated(turned, moved, found)
 
     def _scale(self, found: ConstructedAttitude) -> Float[Array, "3"]:
-        """The constructed angles' noise in terms of what the attitude filter was told."""
-        told = jnp.linalg.norm(self.attitude.filter.R_root, axis=1)
+        """The constructed angles' noise in terms of what the attitude filter assumes."""
+        assumed = jnp.linalg.norm(self.attitude.filter.R_root, axis=1)
         std = lambda: standard_deviations(*found.window, self.position_std, self.accelerometer_std, limits=self.limits)
         # most readings bring no fix
-        return jax.lax.cond(jnp.any(found.known), std, lambda: told) / told
+        return jax.lax.cond(jnp.any(found.known), std, lambda: assumed) / assumed
 
 
 def _rotation_std(filter: AbstractFilter, state: FilterState) -> Float[Array, "3"]:

@@ -48,7 +48,7 @@ def rows_of(log: SensorLog, suite: SensorSuite) -> Rows:
     """The rows of a log: inertial readings in each, and measurements in the row nearest to when they were taken.
 
     Inertial readings of an interval are the means of those at its ends; where some are missing they are interpolated,
-    and over longer gaps, or at a stop, the filter is told how far they may be wrong. **Raises** `InputError` where
+    and over longer gaps, or at a stop, they have a larger standard deviation. **Raises** `InputError` where
     fewer than two rows have inertial readings.
     """
     findings: list[Finding] = []

@@ -77,7 +77,7 @@ class StrapdownNavigation(AbstractProcess):
         turned = normalised(product(exponential(change[:3]), x[:4]))
         return jnp.concatenate([turned, x[4:] + change[3:]])
 
-    def apart(self, x: Float[Array, "16"], origin: Float[Array, "16"]) -> Float[Array, "15"]:
+    def difference(self, x: Float[Array, "16"], origin: Float[Array, "16"]) -> Float[Array, "15"]:
         """The rotation between the two, and the differences of the rest."""
         return jnp.concatenate([logarithm(product(x[:4], conjugate(origin[:4]))), x[4:] - origin[4:]])
 

@@ -27,7 +27,7 @@ class Reading(eqx.Module):
     - `time`: s, of one clock. In 32 bits it is rounded to 0.12 ms after half an hour, to 8 ms after a day.
     - `inputs`: what drove the process since the reading before.
     - `outputs`: (c,) measured channels; `mask`: (c,) true where measured.
-    - `scale`: (c,) noise of the channels in terms of what the filter was told; by default one.
+    - `scale`: (c,) noise of the channels in terms of what the filter assumes; by default one.
     """
 
     time: Float[Array, " *k"]

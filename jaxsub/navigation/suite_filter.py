@@ -1,4 +1,4 @@
-"""The filter that a suite of sensors makes: what each shows, how far it errs, and the rule of the process noise."""
+"""The filter of a suite of sensors: what each measures, the size of its errors, and the rule of the process noise."""
 
 import dataclasses
 import math

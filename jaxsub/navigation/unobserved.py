@@ -18,8 +18,8 @@ def unobserved(found: Navigation) -> list[str]:
     fixes = [sensor.name for sensor in suite.of("gps", "usbl") if found.rows.used[sensor.name]]
     said = [*_of_heading(found)]
     if not fixes:
-        told = " but for how far the motion reaches, which the file says" if math.isfinite(suite.motion.reach) else ""
-        said.append(f"No sensor fixes the position north and east{told}: x and y count from where the log begins.")
+        bounded = " but for the motion's reach, which the file states" if math.isfinite(suite.motion.reach) else ""
+        said.append(f"No sensor fixes the position north and east{bounded}: x and y count from where the log begins.")
     if not suite.of("pressure", "depth") and not any("z" in s.channels or "altitude" in s.channels
                                                      for s in suite.of("gps", "usbl")):  # fmt: skip
         said.append("No sensor measures depth: z counts from where the log begins.")

@@ -1,4 +1,4 @@
-"""Division of recordings in time, into those that are fitted and those that are held out."""
+"""Division of recordings in time, into training and test runs."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ def split(recording: Recording, fraction: float = 0.7) -> tuple[Recording, Recor
 
 
 def hold_out(recordings: Sequence[Recording], fraction: float = 0.7) -> tuple[list[Recording], list[Recording]]:
-    """Return (train, held): the last run is held out or, of a single run, what follows `fraction` of its duration.
+    """Return (training, test): the test run is the last or, of a single run, what follows `fraction` of its duration.
 
     Raises InputError when there is no run, or a single run is too short to divide.
     """

@@ -127,7 +127,7 @@ def _units(headers: list[str], row: Sequence[Cell]) -> list[str]:
         text = "1" if text in ("-", "none") else text
         stated.append(header if not header or not text or unit == text else f"{name}[{text}]")
         if unit is not None and text and unit != text:
-            stated[-1] = f"{name}[{unit} and {text}]"  # no unit, so that the column is refused where it is asked for
+            stated[-1] = f"{name}[{unit} and {text}]"  # no unit, so that the column is rejected where it is used
     return stated
 
 

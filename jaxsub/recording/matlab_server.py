@@ -31,7 +31,7 @@ def main() -> None:
         sys.stdout.buffer.write(ANSWER.pack(succeeded, len(content)) + content)
         sys.stdout.buffer.flush()
         if not hasattr(os, "fork"):
-            return  # a file may have damaged this process, which cannot be told from outside: the next has another
+            return  # a file may have damaged this process, which cannot be seen from outside: the next has another
 
 
 def _read(read: Callable[[str], dict], path: str, room: int) -> tuple[bool, bytes]:

@@ -31,7 +31,7 @@ def read_netcdf(path: Path, source: str) -> Contents:
             kept, findings = {}, []
             for name, variable in file.variables.items():
                 if along is None:
-                    kept[name] = xarray.Variable((), np.nan)  # refused by its names alone
+                    kept[name] = xarray.Variable((), np.nan)  # rejected by its names alone
                 elif variable.dims != along or len(along) != 1:
                     kept[name] = variable  # not loaded
                 else:

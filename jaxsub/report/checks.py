@@ -38,8 +38,8 @@ def draw_checks(diagnosis: Conclusions) -> Picture | None:
     overlay = telling_overlay(diagnosis)
     names = affected_channels(diagnosis, overlay) if overlay else []
     left = {name: {model: known[name] for model, known in diagnosis.remains.items()} for name in names}
-    told = lambda models: any(np.any(np.isfinite(one.lagged)) for one in models.values())
-    left = {name: models for name, models in left.items() if told(models)}
+    correlated = lambda models: any(np.any(np.isfinite(one.lagged)) for one in models.values())
+    left = {name: models for name, models in left.items() if correlated(models)}
     if overlay is None or not left:
         return None
     alt = f"Spectrum and correlations of what remains of {', '.join(left)} in unseen runs"

@@ -35,7 +35,7 @@ _KINDS = {
     "actuator": "an actuator",
     "sensor": "a sensor",
     "environment": "the surroundings",
-    "disturbance": "random forces and noise alone",
+    "disturbance": "disturbance forces and noise",
 }
 
 _BY_EFFECTS = (

@@ -24,11 +24,11 @@ def sweep_pictures(dataset: xarray.Dataset, summary: dict[str, Any]) -> list[Pic
         return [_draw(dataset.sel(vehicle=c["vehicle"], recording=c["recording"]), c) for c in cases]
 
 
-def _draw(case: xarray.Dataset, told: dict[str, Any]) -> Picture:
+def _draw(case: xarray.Dataset, entry: dict[str, Any]) -> Picture:
     names = _telling(case)
     figure = new_figure(9.8, max(3.2, 0.26 * len(names) + 1.6))
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
-    _waterfall(left, case, told)
+    _waterfall(left, case, entry)
     _places(right, case, names)
     handles = [
         Line2D([], [], ls="", marker="o", ms=4, color=IMPROVED, label="ends at the least cost known"),
@@ -36,14 +36,14 @@ def _draw(case: xarray.Dataset, told: dict[str, Any]) -> Picture:
         Line2D([], [], ls="", marker="|", ms=7, color=GREY, label="starts"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    title = f"{told['vehicle']} on {told['recording']}"
+    title = f"{entry['vehicle']} on {entry['recording']}"
     figure.suptitle(drawable(title, 80), x=0.01, ha="left", fontsize=10)
-    name = file_stem(f"sweep-{told['vehicle']}-{told['recording']}")
-    alt = f"How far above the least cost {told['success']['count']} searches ended, and at which coefficients"
+    name = file_stem(f"sweep-{entry['vehicle']}-{entry['recording']}")
+    alt = f"How far above the least cost {entry['success']['count']} searches ended, and at which coefficients"
     return Picture(name, alt, png(figure))
 
 
-def _waterfall(axes: Axes, case: xarray.Dataset, told: dict[str, Any]) -> None:
+def _waterfall(axes: Axes, case: xarray.Dataset, entry: dict[str, Any]) -> None:
     """Rise of the cost over the best of the same recordings, in order: a step is a basin."""
     cost = np.asarray(case.cost.transpose("noise", "start"))
     cost = np.where(np.isfinite(cost), cost, np.inf)
@@ -55,7 +55,7 @@ def _waterfall(axes: Axes, case: xarray.Dataset, told: dict[str, Any]) -> None:
     rank, height = np.arange(1, len(order) + 1), np.maximum(rise[order], _LOWEST)
     for chosen, color in ((good[order], IMPROVED), (~good[order], BASELINE)):
         axes.plot(rank[chosen], height[chosen], "o", ms=3, color=color, mew=0)
-    axes.axhline(told["margin"], color=GREY, lw=0.8, ls=":")
+    axes.axhline(entry["margin"], color=GREY, lw=0.8, ls=":")
     axes.set_yscale("log")
     axes.set_ylim(_LOWEST / 2.0, 4.0 * max(float(height.max(initial=1.0)), 1.0))
     axes.set_xlim(0, len(rise) + 1)
@@ -64,7 +64,7 @@ def _waterfall(axes: Axes, case: xarray.Dataset, told: dict[str, Any]) -> None:
     axes.yaxis.set_minor_locator(NullLocator())
     axes.set_xlabel(f"searches, the lowest first ({len(rise) - len(order)} without an end)")
     axes.set_ylabel("cost above the least known")
-    axes.set_title(f"{percent(told['success']['share'])} succeed (dotted: the margin)")
+    axes.set_title(f"{percent(entry['success']['share'])} succeed (dotted: the margin)")
 
 
 def _telling(case: xarray.Dataset) -> list[str]:

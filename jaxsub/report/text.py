@@ -62,7 +62,7 @@ def p_value(p: float) -> str:
 
 
 def p_equals(p: float) -> str:
-    """What stands in a sentence: `p = 0.031`, or `p < 10⁻³⁰⁰`."""
+    """As in a sentence: `p = 0.031`, or `p < 10⁻³⁰⁰`."""
     said = p_value(p)
     return f"p {said}" if said.startswith("<") else f"p = {said}"
 
@@ -92,7 +92,7 @@ def visible(value: Any) -> Any:
 
     What is no text stays, and what was marked as safe stays so. Line breaks and tabs stay.
     """
-    # each letter is asked for once: a page with its pictures has millions
+    # each letter is looked up once: a page with its pictures has millions
     hidden = {letter for letter in set(value) if not _shows(letter)} if isinstance(value, str) else set()
     if not hidden:
         return value

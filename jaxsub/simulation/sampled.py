@@ -106,7 +106,7 @@ def simulate(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -
     return measure(vehicle, runs, sampled_states(vehicle, runs, start))
 
 
-# whatever asks for a trajectory has this program of it, since a loop over samples takes long to compile
+# whatever needs a trajectory has this program of it, since a loop over samples takes long to compile
 @compiled
 def sampled_states(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
     """States at the samples of `runs` by the sampled step; `integrate` gives them by the continuous model."""

@@ -116,24 +116,24 @@ def clear_dead(parent: Path) -> None:
 
 def is_dead(folder: Path) -> bool:
     """Whether the process that made a scratch folder is known to have ended."""
-    told = _NAME.fullmatch(folder.name)
-    if told is None or told["host"] != _host():
+    named = _NAME.fullmatch(folder.name)
+    if named is None or named["host"] != _host():
         return False
     try:
         lock = os.open(folder / _LOCK, os.O_RDWR)
     except OSError:
-        return not _runs(int(told["pid"]))
+        return not _runs(int(named["pid"]))
     try:
-        return _lock(lock) if fcntl else not _runs(int(told["pid"]))
+        return _lock(lock) if fcntl else not _runs(int(named["pid"]))
     finally:
         os.close(lock)
 
 
 def _require_other_key(other: Path, own: Path, out: Path) -> None:
-    told, wanted = _NAME.fullmatch(other.name), _NAME.fullmatch(own.name)
-    if told and wanted and told["key"] == wanted["key"]:
+    named, wanted = _NAME.fullmatch(other.name), _NAME.fullmatch(own.name)
+    if named and wanted and named["key"] == wanted["key"]:
         remedy = f"wait for it or choose another --out; if it has ended, remove {other}"
-        raise InputError(str(out), f"process {told['pid']} on {told['host']} is writing there", remedy)
+        raise InputError(str(out), f"process {named['pid']} on {named['host']} is writing there", remedy)
 
 
 def _clear(folder: Path) -> None:

@@ -22,7 +22,7 @@ def sweep(
     """Do what of `plan` is missing in `folder`, and open it.
 
     `cluster` is the address of a Dask scheduler, or `local` for one that is started here and stopped again; without,
-    this process does it on its own devices. `progress` is told how many searches are done, of how many. Draws and
+    this process does it on its own devices. `progress` is called with the searches done, and all. Draws and
     chunks are the same either way, so a sweep may be begun on one machine and go on elsewhere.
 
     Whatever ends the process, chunks that are done stay, and the same call does the others.

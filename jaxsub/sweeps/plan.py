@@ -22,7 +22,7 @@ from ..vehicle import AbstractVehicle
 # files in a folder that every notebook still opens at once
 _FILES = 500
 _STARTS, _NOISE = 0, 1
-# methods that ask for no more than a problem on C gives
+# methods that need no more than a problem on C gives
 _ON_C = ("gauss_newton", "nelder_mead")
 # the random numbers are those of this generator, whichever a program may have chosen for itself
 _GENERATOR = "threefry2x32"

@@ -41,16 +41,16 @@ def run_chunks(plan: Plan, chunks: Sequence[Chunk]) -> list[Answers]:
     starts = jnp.where(real[:, None], plan.start_points(case, numbers), jnp.nan)
     outputs = plan.outputs(case, numbers)
     found = METHODS[plan.method]().run(problem, starts, outputs)
-    told = ends(problem, found, outputs)
+    evaluated = ends(problem, found, outputs)
     answers = {
         "start": _physical(problem, starts),
-        "estimate": told.theta,
-        "standard_error": told.standard_errors,
+        "estimate": evaluated.theta,
+        "standard_error": evaluated.standard_errors,
         "coordinates": found.y,
         "cost": found.cost,
-        "away": told.away,
+        "away": evaluated.away,
         "evaluations": found.evaluations,
-        "outcome": _outcomes(told.result),
+        "outcome": _outcomes(evaluated.result),
     }
     whole = {name: np.asarray(values) for name, values in answers.items()}
     inside = [index * size + np.arange(chunk.last - chunk.first) for index, chunk in enumerate(chunks)]

@@ -106,9 +106,9 @@ def check_folder(folder: Path, plan: Plan) -> dict[str, Any] | None:
         kept = kept_plan(folder)
     except InputError:
         kept = _from_chunks(folder, wanted)
-    told = difference(kept["plan"], wanted) if kept is not None else None
-    if told:
-        what = f"holds another sweep: {told}"
+    differing = difference(kept["plan"], wanted) if kept is not None else None
+    if differing:
+        what = f"holds another sweep: {differing}"
         raise InputError(str(folder), what, "choose another --out, or add --overwrite to begin anew")
     return kept
 

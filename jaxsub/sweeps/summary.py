@@ -101,13 +101,13 @@ def _assessed(plan: Plan, index: int, case: xarray.Dataset, best: int) -> Assess
 
 
 def _coefficients(rows: list, case: xarray.Dataset, best: np.ndarray) -> dict[str, Any]:
-    noise, told = np.arange(len(best)), {}
+    noise, numbers = np.arange(len(best)), {}
     for row in rows:
         own = case.sel(coefficient=row.name)
         ends = np.asarray(own.estimate)
         finite = ends[np.isfinite(ends) & np.isfinite(np.asarray(own.cost))]
         chosen, errors = ends[noise, best], np.asarray(own.standard_error)[noise, best]
-        told[row.name] = {
+        numbers[row.name] = {
             "unit": row.unit,
             "file_value": float(own.file_value),
             "best": _number(chosen[0]),
@@ -115,12 +115,12 @@ def _coefficients(rows: list, case: xarray.Dataset, best: np.ndarray) -> dict[st
             "percentiles_5_50_95": [_number(p) for p in np.percentile(finite, (5, 50, 95))] if finite.size else None,
         }
         if len(noise) > 1:
-            told[row.name] |= {
+            numbers[row.name] |= {
                 "mean_over_noise": _number(np.mean(chosen)),
                 "spread_over_noise": _number(np.std(chosen, ddof=1)),
                 "standard_error_mean": _number(np.mean(errors)),
             }
-    return told
+    return numbers
 
 
 def _number(value: float | np.floating) -> float | None:

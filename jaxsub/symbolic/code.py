@@ -76,7 +76,7 @@ class Native:
 
 
 class _Buffers(threading.local):
-    """Arrays of a call; `__init__` runs anew in each thread that first asks for them."""
+    """Arrays of a call; `__init__` runs in each thread at its first use."""
 
     def __init__(self, given: Sequence[int], found: Sequence[int], pointers: tuple[int, int], work: tuple[int, int]):
         self.given, self.found = [[np.zeros(max(size, 1)) for size in sizes] for sizes in (given, found)]

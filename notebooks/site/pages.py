@@ -76,7 +76,7 @@ def write_pages(out: Path, reference: Reference) -> list[str]:
 
 
 def source_text(path: Path) -> str:
-    """A Markdown file with tables of experiments where it asks for them: `{table of NAME: how its header begins}`."""
+    """A Markdown file with tables of experiments where it has such a line: `{table of NAME: how its header begins}`."""
 
     def table(match: re.Match[str]) -> str:
         page = (ROOT / "experiments" / match[1] / "README.md").read_text(encoding="utf-8")

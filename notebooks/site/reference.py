@@ -15,7 +15,7 @@ import pdoc.render
 
 from . import mathematics
 
-# modules that hold what a user asks for and that their rooms do not hand on
+# modules that hold what a user needs and that their rooms do not hand on
 _BESIDE = (
     "jaxsub.discrepancy.next_run",
     "jaxsub.filter.ekf",
@@ -42,7 +42,7 @@ class Reference(NamedTuple):
         # imported before pdoc does, which forbids modules to ask the machine what it is
         for found in pkgutil.walk_packages(path, f"{package}."):
             module = importlib.import_module(found.name)
-            # pdoc lists what is in a module already, and a package may import its names when they are asked for
+            # pdoc lists what is in a module already, and a package may import its names at their first use
             for name in getattr(module, "__all__", ()):
                 getattr(module, name)
         # the package lists names in `__all__`, of which pdoc takes it that nothing else is public

@@ -7,8 +7,8 @@ import pytest
 from stream_cases import BIAS, STOP, G, at, counted, same
 
 from jaxsub.filter import ConstantNoise, ExtendedKalmanFilter, FuzzyNoise, Sample
-from jaxsub.navigation.ahead import ahead_of_time
 from jaxsub.navigation.attitude import AbstractAttitude, Gyro, PaperAttitude, RotationAttitude
+from jaxsub.navigation.compiled_step import ahead_of_time
 from jaxsub.navigation.constructed import constructed_over, standard_deviations
 from jaxsub.navigation.navigator import FlightReading, PaperNavigator
 from jaxsub.navigation.position import Course, DeadReckoning

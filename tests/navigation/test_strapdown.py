@@ -77,14 +77,14 @@ def test_a_constant_rate_and_force_converge_to_the_exact_path_with_the_square_of
 
 def test_moved_and_apart_are_inverses():
     x, change = state_at(Rotation.random(rng=rng)), jnp.asarray(rng.normal(size=15))
-    np.testing.assert_allclose(PROCESS.apart(PROCESS.moved(x, change), x), change, atol=1e-12)
+    np.testing.assert_allclose(PROCESS.difference(PROCESS.moved(x, change), x), change, atol=1e-12)
 
 
 def test_the_jacobians_are_those_of_differences():
     x = state_at(Rotation.random(rng=rng), rng.normal(size=3), rng.normal(size=3), 0.1 * rng.normal(size=6))
     inputs = sample(rng.normal(size=3), rng.normal(size=3) - G, 0.1 * rng.normal(size=3) + FIELD)
     after = PROCESS.step(x, NOTHING, inputs)
-    step = jax.jit(lambda c: PROCESS.apart(PROCESS.step(PROCESS.moved(x, c), NOTHING, inputs), after))
+    step = jax.jit(lambda c: PROCESS.difference(PROCESS.step(PROCESS.moved(x, c), NOTHING, inputs), after))
     see = jax.jit(lambda c: PROCESS.observe(PROCESS.moved(x, c), NOTHING, inputs)[:6])
     for f in (step, see):
         J = jax.jacfwd(f)(jnp.zeros(15))

@@ -11,8 +11,8 @@ from stream_cases import STOP, altered, at, attitude_stream, counted, gentle_rea
 
 from jaxsub.errors import InputError
 from jaxsub.filter import ConstantNoise, RandomNoise, Sample
-from jaxsub.navigation.ahead import ahead_of_time, native
 from jaxsub.navigation.attitude import Gyro
+from jaxsub.navigation.compiled_step import ahead_of_time, native
 from jaxsub.navigation.stream import follow
 
 

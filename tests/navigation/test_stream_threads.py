@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from stream_cases import at, attitude_stream, gentle_readings, started
 
-from jaxsub.navigation.ahead import ahead_of_time, native
+from jaxsub.navigation.compiled_step import ahead_of_time, native
 
 C = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 WAYS = {"xla": ahead_of_time, "c": lambda stream, *like: native(stream.step, *like)}

@@ -1,4 +1,4 @@
-"""A vehicle's sensors as a file describes them: what each measures, how it is mounted, and how far it errs."""
+"""A vehicle's sensors as a file describes them: what each measures, how it is mounted, and how large its errors are."""
 
 from .grades import GRADES, Grade
 from .read import read_sensors, sensors_from

@@ -12,7 +12,7 @@ _DEGREE, _MILLI_G = math.radians(1.0), 1e-3 * GRAVITY
 
 
 class Grade(NamedTuple):
-    """How far a triad of inertial sensors errs, SI.
+    """Errors of a triad of inertial sensors, SI.
 
     **Fields**
 

@@ -47,7 +47,7 @@ class DataFlash(Log):
             return [Channel(f"{name}.{f}", unit, counts[name]) for name, listed in found.items() for f, unit in listed]
 
     def series(self, names: list[str]) -> dict[str, Series]:
-        """Only the messages asked for are decoded."""
+        """Only the requested messages are decoded."""
         wanted: dict[str, list[str]] = {}
         for name in names:
             topic, _, field = name.partition(".")

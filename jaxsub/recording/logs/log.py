@@ -56,7 +56,7 @@ class Log(abc.ABC):
 class MessageLog(Log):
     """A log of messages by topic, each a tree of numbers and lists; its channels are `topic.field.part[index]`."""
 
-    # of a list, such as an image, no more than this many entries are listed; any may be asked for
+    # of a list, such as an image, no more than this many entries are listed; any may be requested
     LISTED = 32
 
     @abc.abstractmethod

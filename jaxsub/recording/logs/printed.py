@@ -52,7 +52,7 @@ def _turned_away(file: IO[str]) -> Iterator[None]:
 
 
 def _said(file: IO[str]) -> str:
-    """What `file` holds, as the end of a sentence: damage may be told for each byte, so the first line and a count."""
+    """What `file` holds, as the end of a sentence: the first line and a count, as each damaged byte may have a line."""
     file.seek(0)
     first = " ".join(file.readline().split())[:_SHOWN]
     more = sum(1 for _ in file)

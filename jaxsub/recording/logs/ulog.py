@@ -13,7 +13,7 @@ from .log import Channel, Log, Series
 _MICRO = 1e-6  # its stamps are in µs
 _HEAD = 3  # bytes of a message: its length and kind
 _LONGEST = 2**16  # bytes of a message
-_DEFINITIONS = 2**22  # bytes of a log in which its formats stand
+_DEFINITIONS = 2**22  # bytes of a log that hold its formats
 
 
 class _Counted(io.BufferedReader):
@@ -25,7 +25,7 @@ class _Counted(io.BufferedReader):
         super().__init__(io.FileIO(path))
 
     def read(self, size: int | None = -1) -> bytes:
-        """The next `size` bytes. At the end of a whole file the reader asks for a message's head and gets nothing."""
+        """The next `size` bytes. At the end of a whole file the reader requests a message's head and gets nothing."""
         data = super().read(size)
         asked = size or 0
         self.ends_within = 0 < len(data) < asked or (not data and asked > _HEAD)
@@ -54,7 +54,7 @@ class ULog(Log):
         ]
 
     def series(self, names: list[str]) -> dict[str, Series]:
-        """Only the topics asked for are decoded."""
+        """Only the requested topics are decoded."""
         topics = sorted({name.partition(".")[0].partition("[")[0] for name in names})
         found = {}
         for data in self._read(topics).data_list:

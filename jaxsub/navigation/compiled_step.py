@@ -124,7 +124,7 @@ class Program:
         ),
         one: np.dtype | None = None,
     ):
-        """What else the step uses becomes part of the program; `compiler` is told the shapes of one call.
+        """What else the step uses becomes part of the program; `compiler` is given the shapes of one call.
 
         Numbers travel in one array of each type, or all in one of type `one`.
         """
