@@ -22,7 +22,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from experiments.parts import main
-from jaxsub.estimate import gauss_newton, method, share_for
+from jaxsub.estimate import gauss_newton, method
+from jaxsub.estimate.method import share_for
 from jaxsub.sweeps import open_sweep, sweep
 
 from .case import longer, plan

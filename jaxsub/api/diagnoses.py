@@ -144,7 +144,10 @@ class Diagnosis(AbstractResult):
         return bool(self.conclusions.explanations) and self.complete
 
     def with_next_run(self, train: Sequence[Recording], progress: Progress = lambda message: None) -> "Diagnosis":
-        """The same with the inputs that would tell rivals of the runs `train` apart, where any remain."""
+        """The same with the inputs that would separate rivals of the runs `train`, where any remain.
+
+        `progress` is called with a line on what is being done.
+        """
         if not self.undecided:
             return self
         progress("looking for the manoeuvre that would settle it")
@@ -229,7 +232,7 @@ class Diagnosis(AbstractResult):
         write_report(self.conclusions, text, folder)
 
     def write_numbers(self, folder: Path) -> str:
-        """Write `diagnosis.json` and `improved.toml` alone; returns the latter's text."""
+        """Write `diagnosis.json` and `improved.toml` alone into `folder`; returns the latter's text."""
         made = self.conclusions
         text = vehicle_text(with_coefficients(self.improved), f"{made.vehicle}, improved by jaxsub\n{made.summary}")
         (folder / "improved.toml").write_text(text, encoding="utf-8")

@@ -23,9 +23,9 @@ from ..estimate import (
     batch,
     posterior,
     require_free,
-    require_runs,
 )
 from ..estimate import fit as solve
+from ..estimate.between_runs import require_runs
 from ..findings import Finding
 from ..information import (
     CoefficientEstimate,

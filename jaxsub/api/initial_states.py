@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..errors import InputError
-from ..estimate import initial_guess, rest, search, state_channels, unknown_spreads
+from ..estimate import initial_guess, rest, search, state_channels
+from ..estimate.between_runs import unknown_spreads
 from ..findings import Finding
 from ..recording import Recording
 from ..recording.runs import Runs

@@ -48,11 +48,11 @@ def sweep(
     """Fits from `starts` initial guesses: what `jaxsub sweep` computes.
 
     `vehicle` is one, or several by name; `recordings` are one or several, checked as `js.check` does, and fitted all
-    together or, with `apart`, each on its own. Guesses are drawn within ± `spread` of each coefficient's value. With
-    `noise_seeds` the recordings are answers of a fitted vehicle with noise drawn that often: a bootstrap. `compiled`
-    searches by C made of the model. What is done is kept in `folder`, where the same call goes on; without one in a
-    temporary folder. `cluster` is the address of a Dask scheduler, or `local`. `progress` is called with the number of
-    searches done and that of all.
+    together or, with `apart`, each on its own. Guesses are drawn by `seed` within ± `spread` of each coefficient's
+    value, and searched by `method`, as of `js.fit`. With `noise_seeds` the recordings are answers of a fitted vehicle
+    with noise drawn that often: a bootstrap. `compiled` searches by C made of the model. What is done is kept in
+    `folder`, where the same call goes on; without one in a temporary folder. `cluster` is the address of a Dask
+    scheduler, or `local`. `progress` is called with the number of searches done and that of all.
 
     **Raises** `InputError` where nothing is free, for recordings that cannot be used, for what a plan cannot be and for
     a folder that holds something else.

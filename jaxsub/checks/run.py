@@ -49,10 +49,11 @@ class Checked:
 
 
 def check(vehicle: AbstractVehicle, recordings: Recordings, held_out: Recordings = ()) -> Checked:
-    """Look at one run or several before any fit: faults of clocks and sensors, contradictions among them, the vehicle.
+    """Check one run or several before any fit: faults of clocks and sensors, contradictions among them, the vehicle.
 
-    Nothing is raised for what is wrong: it is in the findings. Samples that cannot be are masked, angles unwrapped, and
-    a run is cut where time has a hole while an input moved; each of these is a finding too.
+    `recordings` are the runs that `vehicle` would be fitted to, one or several, and `held_out` the test runs. Nothing
+    is raised for what is wrong: it is in the findings. Samples that cannot be are masked, angles unwrapped, and a run
+    is cut where time has a hole while an input moved; each of these is a finding too.
     """
     recordings, held_out = listed(recordings), listed(held_out)
     layout = vehicle.layout
@@ -124,6 +125,6 @@ def _columns(recording: Recording, channels: Sequence[Channel], known: set[str])
 
 
 def from_error(check: str, error: InputError) -> Finding:
-    """A finding that says what an error says."""
+    """A finding of the `check` of that name that says what `error` says."""
     where, what, remedy = error.parts
     return Finding(check, "error", where, what, remedy)

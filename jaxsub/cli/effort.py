@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import jax
 
-from ..likelihood import block_length
+from ..likelihood.blocks import block_length
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from . import terminal

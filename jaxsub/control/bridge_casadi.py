@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def casadi_plant(plant: Plant, name: str = "plant") -> "casadi.Function":
-    """The `casadi.Function` (x, u, t) ↦ (x_next, y) of `plant`, SI; t is the time of the sample, s.
+    """The `casadi.Function` (x, u, t) ↦ (x_next, y) of `plant`, SI, under `name`; t is the time of the sample, s.
 
     It is made of the program that JAX runs, with the vehicle's numbers as constants, so that it differs from the plant
     by rounding alone; `symbolic.write_c` makes C of it.
@@ -30,7 +30,7 @@ def casadi_plant(plant: Plant, name: str = "plant") -> "casadi.Function":
 
 
 def casadi_jacobians(function: "casadi.Function") -> "casadi.Function":
-    """The `casadi.Function` (x, u, t) ↦ (A, B, C, D) of one by `casadi_plant`, by CasADi's own derivatives."""
+    """The `casadi.Function` (x, u, t) ↦ (A, B, C, D) of `function`, one by `casadi_plant`, by CasADi's derivatives."""
     from ..symbolic import casadi
 
     x, u, t = (casadi.SX.sym(key, function.size1_in(key)) for key in ("x", "u", "t"))

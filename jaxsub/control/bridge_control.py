@@ -13,7 +13,7 @@ from .plant import Plant
 
 
 def control_system(plant: Plant, name: str | None = None) -> Any:
-    """The discrete-time `control.NonlinearIOSystem` of `plant`; states, inputs and outputs have its names, SI.
+    """The discrete-time `control.NonlinearIOSystem` of `plant`, under `name`; its signals have the plant's names, SI.
 
     python-control calls the compiled step and outputs of the plant at the times of samples, so the two agree exactly.
 
@@ -37,7 +37,7 @@ def control_system(plant: Plant, name: str | None = None) -> Any:
 
 
 def state_space(linear: LinearPlant, name: str | None = None) -> Any:
-    """The `control.StateSpace` of deviations from the point of `linear`; continuous where its `dt` is zero.
+    """The `control.StateSpace`, named `name`, of deviations from the point of `linear`; continuous where `dt` is zero.
 
     It is exact for the linear plant; how far that is from the plant itself `linearisation_error` says.
 

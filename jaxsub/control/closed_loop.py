@@ -43,17 +43,17 @@ def fly(
     given: Mapping[str, np.ndarray] | None = None,
     name: str = "flight",
 ) -> Recording:
-    r"""The recording of a flight of `vehicle` under `autopilot`, by the sampled step.
+    """The recording of a flight of `vehicle` under `autopilot`, by the sampled step.
 
-    At each of `times` (K,) s the autopilot is shown what the sensors show, noise included, and its deflections are held
-    until the next. Columns are the inputs as flown, before any actuator of the vehicle's effects, and the measured
-    channels, SI; to simulate the inputs by `synthetic` with `sampled_states`, the same `start` and `seed` gives the
-    same recording.
+    At each of `times` (K,) s the autopilot is shown what the sensors show, with `noise` drawn by `seed`, and its
+    deflections are held until the next. Columns are the inputs as flown, before any actuator of the vehicle's effects,
+    and the measured channels, SI; to simulate the inputs by `synthetic` with `sampled_states`, the same `start` and
+    `seed` gives the same recording, of which `name` is the name.
 
     - `reference`: (K,) each of `course_rate` (rad/s), `depth` (m), `roll` (rad); zero where absent.
     - `given`: (K,) by input column. One that the autopilot moves follows this instead, within its fin's limits; the
       vehicle's other inputs, prescribed motions and surroundings all have to be here.
-    - `start`: the initial state, by default level and ahead at the operating speed.
+    - `start`: (s,) the initial state, SI, by default level and straight on at the operating speed.
 
     **Raises** `InputError` for a channel, a reference or a column that is missing, unknown or of another length, and
     for a vehicle that is lost: not finite, or pitched or adrift by more than 60°.

@@ -47,11 +47,11 @@ def trim(
     *,
     time: Time = 0.0,
 ) -> Trim:
-    """The steady motion of `plant` in which channels and inputs have the values `wanted`, SI.
+    """The steady motion of `plant` in which channels and inputs have the values `wanted`, SI, at `time` in s.
 
     Each input needs a condition. While there are fewer, a body is wanted level (`depth_rate` zero, unless there is a
     `theta`), straight (`heading_rate`, unless there is an `r`) and upright (`phi`), in that order. `at` gives its place
-    and heading, elsewhere zero.
+    (m) and heading (rad), elsewhere zero.
 
     **Raises** `InputError` for a name that is unknown and for a number of conditions that does not fit.
     """
@@ -94,7 +94,7 @@ def _found(
 
 
 def require_trim(plant: Plant, found: Trim, tolerance: float = 1e-6) -> Trim:
-    """`found`. **Raises** `InputError` where nothing was found: more than `tolerance`, SI, is left."""
+    """`found`, a trim of `plant`. **Raises** `InputError` where more than `tolerance` (SI) is left: none was found."""
     if not float(found.residual) < tolerance:
         what = f"has no trim as wanted: {float(found.residual):.2g} (SI) of its rates and conditions is left"
         raise InputError(plant.vehicle.layout.name, what, "want another speed or attitude, or free another input")

@@ -33,10 +33,10 @@ def export_plant(
     """Write `plant` to the file `path`: StableHLO of its step, outputs and Jacobians with the vehicle's numbers in it.
 
     The file is a zip archive of data alone: `plant.json` (names, `dt`, the vehicle's numbers, SI) and each of
-    `plant_loader.PROGRAMS` as `jax.export` serialises it. `load_plant` reads it, for at least six months after its
-    version; a machine without jaxsub does so by JAX, flatbuffers and the file that `export_plant_loader` writes. Step
-    and outputs keep one derivative. `x` and `u` are a state and inputs to start from, such as a trim; by default at
-    rest.
+    `plant_loader.PROGRAMS` as `jax.export` serialises it, for the `platforms` named as JAX does. `load_plant` reads it,
+    for at least six months after its version; a machine without jaxsub does so by JAX, flatbuffers and the file that
+    `export_plant_loader` writes. Step and outputs keep one derivative. `x` (s,) and `u` (m,) are a state and inputs,
+    SI, to start from, such as a trim; by default at rest.
 
     **Raises** `InputError` where the folder of `path` is not there, flatbuffers is not installed, or a number of `x` or
     `u` is not finite.
@@ -75,7 +75,7 @@ def export_plant(
 
 
 def export_plant_loader(path: Path) -> None:
-    """Write the module that loads plants where there is no jaxsub, such as to `plant_loader.py` beside them.
+    """Write to `path` the module that loads plants where there is no jaxsub, such as `plant_loader.py` beside them.
 
     There, `from plant_loader import load` and `load("my.plant")`; it needs JAX and flatbuffers.
 

@@ -51,13 +51,18 @@ class LinearPlant(eqx.Module):
 
 @compiled
 def linearise(plant: Plant, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> LinearPlant:
-    """The sampled plant about a point, such as a trim: exact derivatives of its step and outputs."""
+    """The sampled `plant` linearised about a point, such as a trim: exact derivatives of its step and outputs.
+
+    `x` (s,) is the state and `u` (m,) the inputs at the point, SI, and `time` that of the sample, s.
+    """
     drift = plant.step(x, u, time) - x
     return _named(plant, plant.jacobians(x, u, time), x, u, plant.output(x, u, time), drift, plant.dt)
 
 
 def linearise_rates(plant: Plant, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> LinearPlant:
-    """The model of which `plant` is the sampled form, in continuous time, about a point.
+    """The model of which `plant` is the sampled form, in continuous time, linearised about a point.
+
+    `x` (s,) is the state and `u` (m,) the inputs at the point, SI, and `time` in s.
 
     **Raises** `InputError` for a plant in whose state actuators or sensors keep samples: these have no rate.
     """

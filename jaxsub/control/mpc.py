@@ -87,13 +87,14 @@ class Mpc(eqx.Module):
         tolerance: float = 1e-4,
         steps: int = 8,
     ) -> "Mpc":
-        """A controller that brings the channels `track` to their references over a `horizon` in s.
+        """A controller that brings the channels `track` of `plant` to their references over a `horizon` in s.
 
         `track` gives the deviation of each that costs one for a second, SI, by default 0.5 m of `z` and 0.09 rad of
         `psi`, those that the plant has. `within` bounds channels, SI; one that passes its bound by the root of `give`,
         in parts of half the range, costs ½ a sample. `limits` are those of every fin, by default `FinLimits.of()`, or
         one for each input by name; `effort` and `pace` the parts of amplitude and rate that cost one for a second.
-        Inputs are `free` at as many samples, closer together at first, and rest where the plant is in trim.
+        Inputs are `free` at as many samples, closer together at first, and rest where the plant is in trim. A
+        sample takes at most `steps` steps of the solver, which ends where one promises less than `tolerance` of 1 + J.
 
         **Raises** `InputError` for a channel that the vehicle has not, an empty range, an input without finite limits,
         and a plant without trim.
@@ -133,7 +134,11 @@ class Mpc(eqx.Module):
         reference: Float[Array, "n t"],
         time: Float[Array, ""] | float = 0.0,
     ) -> Task:
-        """The problem of one sample."""
+        """The optimisation problem of one sample; arguments as of `command`.
+
+        `plan` is the last one, `x` (s,) the state, `reference` (n, t) that of the tracked channels at the samples after
+        this one, all SI, and `time` that of the sample, s.
+        """
         return Task(self.plant, self.weights, self.nodes, x, plan.last, reference, jnp.asarray(time, x.dtype))
 
     def command(
@@ -143,10 +148,10 @@ class Mpc(eqx.Module):
         reference: Float[Array, "n t"],
         time: Float[Array, ""] | float = 0.0,
     ) -> tuple[MpcPlan, Float[Array, " m"], Solved]:
-        """The plan one sample on, the inputs to give now (SI), and how they were found.
+        """The plan one sample on, the inputs to give now (m,), SI, and how they were found.
 
-        `x` is the state, or what an observer says of it; `reference` what is wanted of the tracked channels at the
-        `samples` after this one.
+        `plan` is the one of the sample before. `x` (s,) is the state, or an observer's estimate of it; `reference` (n,
+        t) that of the tracked channels at the `samples` after this one, SI; `time` that of the sample, s.
         """
         task = self.task(plan, x, reference, time)
         y, solved = self.solve(task, plan.nodes)
@@ -159,7 +164,7 @@ class Mpc(eqx.Module):
         return jax.tree.map(lambda a, b: jnp.where(solved.finite, a, b), on, self.start(u)), u, solved
 
     def solve(self, task: Task, y: Float[Array, " d"]) -> tuple[Float[Array, " d"], Solved]:
-        """The plan found from `y`, which keeps the limits of inputs and rates."""
+        """The solution of `task`, searched from the coordinates `y` (d,); it keeps the limits of inputs and rates."""
         solver = Sequential(Task.expand, self.tolerance)
         found = optx.minimise(lambda y, task: task.cost(y), solver, y, task, max_steps=self.most + 1, throw=False)
         y, cost = found.value, found.state.cost

@@ -80,7 +80,7 @@ class Plant(eqx.Module):
         return len(self.vehicle.layout.equations) + len(self.vehicle.layout.positions)
 
     def with_values(self, values: Mapping[str, Any]) -> "Plant":
-        """The plant of the same vehicle with other numbers for those named; delays keep their room in the state."""
+        """The plant of the same vehicle with other `values` (SI) by name; delays keep their room in the state."""
         sampled = _ready(self.vehicle.with_values(dict(values)), self.dt, self.sampled.substeps)
         return dataclasses.replace(self, sampled=sampled)
 
@@ -109,7 +109,10 @@ class Plant(eqx.Module):
         return stack(shown, self.outputs, state[0])
 
     def channels(self, x: Float[Array, " s"], u: Float[Array, " m"], time: Time = 0.0) -> dict[str, Any]:
-        """Every channel that the vehicle can produce, accelerometers apart, before any sensor."""
+        """Every channel that the vehicle can produce, but for accelerometers, before any sensor, SI.
+
+        `x` (s,) is the state, `u` (m,) the inputs, SI, and `time` that of the sample, s.
+        """
         signals = self._nodes(self._signals(u), time)[0]
         return self.vehicle.channels(self.vehicle.motion(x[: self.own], signals))
 

@@ -54,7 +54,8 @@ def pursue(
     """`truth` under `mpc`, which knows of it what the sensors show and what will be wanted.
 
     `wanted` are (K,) references by tracked channel, SI; the controller sees those of its horizon. It estimates its own
-    plant's state by `observer` from the truth's sensors with their noise. `start` is the vehicle's state of the truth.
+    plant's state by `observer` from the truth's sensors with their `noise`, drawn by `seed`. `start` (n,) is the
+    vehicle's state of the truth, SI, and `name` that of the recording.
 
     **Raises** `InputError` where plants differ in interval, inputs or outputs, a reference is missing, or a number
     ceases to be finite.

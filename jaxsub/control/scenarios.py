@@ -15,8 +15,10 @@ COURSE_RATE, COURSE_EVERY = np.radians(20.0), 1.5
 
 
 def references(times: np.ndarray) -> dict[str, np.ndarray]:
-    """The commands of scenario I, (samples,) each: depth 20 m more, then 20 m less, every 5 s; course rate 20°/s to
-    starboard, then to port, every 1.5 s; zero roll."""
+    """The commands of scenario I at `times` (s), (samples,) each.
+
+    Depth 20 m more, then 20 m less, every 5 s; course rate 20°/s to starboard, then to port, every 1.5 s; zero roll.
+    """
     # rounding of the times must not put a change one sample late
     turn = lambda every: np.floor((times - times[0]) / every + 1e-9).astype(int) % 2
     return {
@@ -35,9 +37,9 @@ def scenario_one(
     limits: FinLimits | None = None,
     noise: bool = True,
 ) -> tuple[Recording, dict[str, np.ndarray]]:
-    """Scenario I, the sea trial, flown for `seconds` by autopilots sampled every `dt` s; and its `references`.
+    """Scenario I, the sea trial of `vehicle`, for `seconds` by autopilots sampled every `dt` s; and its `references`.
 
-    The autopilots follow as far as the fins' `limits` let them.
+    The autopilots follow as far as the fins' `limits` let them. They are shown the sensors' `noise`, drawn by `seed`.
 
     **Raises** `InputError` where `dt` does not divide 1.5 s and 5 s, and as `Autopilot.of` and `fly` do.
     """
@@ -59,11 +61,12 @@ def scenario_two(
     elevator: float = 0.12,
     hold: float = 1.5,
 ) -> list[Recording]:
-    """Scenario II: a horizontal run, then a vertical one.
+    """Scenario II: a horizontal run of `vehicle`, then a vertical one, for `seconds` each, sampled every `dt` s.
 
     In the first the elevators hold depth and roll and the rudder follows a pseudo-random binary sequence of amplitude
-    `rudder` (rad), drawn anew every `hold` s; in the second all elevators follow one of amplitude `elevator` and the
-    rudder stays at zero. Noise and sequences come from `seed`. The fins follow within their `limits`.
+    `rudder` (rad), drawn anew every `hold` s; in the second all elevators follow one of amplitude `elevator` (rad) and
+    the rudder stays at zero. The sensors' `noise` and the sequences come from `seed`. The fins follow within their
+    `limits`.
 
     **Raises** `InputError` where `dt` does not divide `hold`, and as `Autopilot.of` and `fly` do: a hull that is
     unstable with its rudder or elevators free is lost.

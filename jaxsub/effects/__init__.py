@@ -17,19 +17,16 @@ from .base import (
     amplitudes,
     number_fields,
     numbers,
-    of_output,
-    option_fields,
     options,
     parameter_table,
-    shape,
     stacked,
     with_numbers,
 )
 from .boundaries import BottomSuction, FreeSurfaceSuction, TetherDrag
-from .derivatives import INPUT_SYMBOLS, INPUT_UNITS, Derivative, Power, alike, derivative
-from .environment import Current, WaveForcing, stream, wave_band
+from .derivatives import Derivative, Power, derivative
+from .environment import Current, WaveForcing, wave_band
 from .events import MassShift, ThrustLoss
-from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss, coriolis
+from .hull import CoriolisCoupling, CrossflowDrag, HullAsymmetry, SpeedScaling, TurningSpeedLoss
 from .hull_damping import CubicDamping, QuadraticDamping
 from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibility, ThermalExpansion, TrimOffset
 from .mechanisms import AsymmetricDamping, CoulombFriction, CubicStiffness, Saturation
@@ -38,7 +35,6 @@ from .motion import (
     CHANNEL_UNITS,
     EQUATIONS,
     FORCE_UNITS,
-    FORCES,
     GRAVITY,
     VELOCITIES,
     AbstractActuation,
@@ -46,12 +42,10 @@ from .motion import (
     Motion,
     Signal,
     by_name,
-    quantity_of,
-    unit_per,
     velocities,
 )
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
-from .registry import VOCABULARY, candidates, from_script, looked_at, named, vocabulary
+from .registry import VOCABULARY, candidates, from_script, looked_at, vocabulary
 from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
 from .sensors import SensorBias, SensorDrift, SensorScale
@@ -60,11 +54,8 @@ from .smooth import KNOTS, SmoothForce, variables
 __all__ = [
     "CHANNEL_UNITS",
     "EQUATIONS",
-    "FORCES",
     "FORCE_UNITS",
     "GRAVITY",
-    "INPUT_SYMBOLS",
-    "INPUT_UNITS",
     "KNOTS",
     "VELOCITIES",
     "VOCABULARY",
@@ -131,27 +122,18 @@ __all__ = [
     "TurningSpeedLoss",
     "WaveForcing",
     "admissible",
-    "alike",
     "amplitude",
     "amplitudes",
     "by_name",
     "candidates",
-    "coriolis",
     "derivative",
     "from_script",
     "looked_at",
-    "named",
     "number_fields",
     "numbers",
-    "of_output",
-    "option_fields",
     "options",
     "parameter_table",
-    "quantity_of",
-    "shape",
     "stacked",
-    "stream",
-    "unit_per",
     "variables",
     "velocities",
     "vocabulary",

@@ -18,9 +18,9 @@ from .motion import EQUATIONS, Facts, Motion, Signal
 
 
 def amplitude(unit: str, sign: int = 0, default: float = 0.0, most: float = math.inf) -> Any:
-    """A field that the effect is linear in about zero, of a size that physics admits up to `most`.
+    """A field in `unit` that the effect is linear in about zero, of a size that physics admits up to `most`.
 
-    `sign` +1 or -1 is the only one that it admits; 0 admits both.
+    `sign` +1 or -1 is the only one that it admits; 0 admits both. `default` is its value where none is given.
     """
     return _field("amplitude", unit, sign, default, most)
 
@@ -290,7 +290,7 @@ def amplitudes(effect: AbstractEffect | type[AbstractEffect]) -> list[str]:
 
 
 def numbers(effect: AbstractEffect) -> dict[str, float]:
-    """The values of the numeric fields, by field."""
+    """The values (SI) of the numeric fields of `effect`, by field."""
     return {field.name: float(getattr(effect, field.name)) for field in number_fields(effect)}
 
 
@@ -318,7 +318,7 @@ def parameter_table(effect: AbstractEffect) -> dict[str, Parameter]:
 
 
 def stacked(effects: Sequence[AbstractEffect]) -> list[tuple[list[int], Any]]:
-    """Effects that differ in their numbers alone as one whose numbers have a leading axis; and which those are.
+    """`effects` that differ in their numbers alone as one whose numbers have a leading axis; and which those are.
 
     What is compiled for such a stack serves all of it.
     """
@@ -330,13 +330,13 @@ def stacked(effects: Sequence[AbstractEffect]) -> list[tuple[list[int], Any]]:
 
 
 def admissible(effect: AbstractEffect, values: dict[str, float]) -> bool:
-    """Whether every value has the sign that physics asks of it and is no larger than it admits."""
+    """Whether each of the `values` (SI) of `effect` has a sign that physics permits and is no larger than it admits."""
     within = all(abs(values[field.name]) <= field.metadata["most"] for field in number_fields(effect))
     return within and all(values[name] * sign >= 0.0 for name, sign in effect.signs().items())
 
 
 def with_numbers(effect: AbstractEffect, values: Mapping[str, ArrayLike]) -> Any:
-    """The same effect with other numbers."""
+    """The same `effect` with other `values` (SI) of its numeric fields, by field."""
     names = [field.name for field in number_fields(effect)]
     return eqx.tree_at(
         lambda e: [getattr(e, n) for n in names], effect, [number(values.get(n, getattr(effect, n))) for n in names]

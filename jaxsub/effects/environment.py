@@ -62,7 +62,7 @@ def stream(positions: Mapping[str, Signal], north: Signal, east: Signal) -> tupl
 
 
 def wave_band(duration: float, sample_interval: float) -> tuple[float, float]:
-    """Frequencies (rad/s) of waves that runs of `duration` (s) sampled at an interval (s) can show.
+    """Frequencies (rad/s) of waves that runs of `duration` (s) can show, sampled every `sample_interval` (s).
 
     From two periods in a run to four samples in a period. Waves of the sea that push a vehicle have periods below half
     a minute; what is slower is no wave. Source: Munk (1950), Proc. 1st Conf. Coastal Eng., fig. 1.

@@ -136,8 +136,9 @@ def with_memories(
 ) -> list[tuple[Motion, Motion]]:
     """For each of `effects` a motion at both ends of every interval, the effect's states filled in, from zero.
 
-    Every leaf that changes has the shape (R, K-1) of `steps`, the length of each interval in s, 0 where padded. Between
-    the ends a motion is taken for a line; the states go over each interval by the classical Runge-Kutta step.
+    `start` and `end` are the motion at the ends, whose leaves that change have the shape (R, K-1) of `steps`, the
+    length of each interval in s, 0 where padded. Between the ends a motion is taken for a line; the states go over each
+    interval by the classical Runge-Kutta step.
     """
     alike = stacked(effects)
     made = _remembered([stack for _, stack in alike], start, end, steps) if alike else []

@@ -100,12 +100,12 @@ class Motion(eqx.Module):
 
 
 def velocities(motion: Motion) -> dict[str, Signal]:
-    """Rates by the name that their user knows: `u` for surge, `q_rate` for a mechanism's coordinate `q`."""
+    """Rates of `motion` by their names in files: `u` for surge, `q_rate` for a mechanism's coordinate `q`."""
     return {VELOCITIES.get(equation, f"{equation}_rate"): rate for equation, rate in motion.rates.items()}
 
 
 def by_name(motion: Motion) -> dict[str, Signal]:
-    """All that a force may follow: velocities, positions, actuators, surroundings."""
+    """All signals of `motion` that a force may follow: velocities, positions, actuators, surroundings."""
     return velocities(motion) | motion.positions | motion.actuators | motion.environment
 
 

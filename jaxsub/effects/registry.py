@@ -140,7 +140,7 @@ def is_effect(kind: object) -> bool:
 
 
 def candidates(facts: Facts, kinds: tuple[type[AbstractEffect], ...] | None = None) -> list[AbstractEffect]:
-    """Every form that makes sense on a vehicle of every effect of `kinds`, by default of `vocabulary`.
+    """Every form of every effect of `kinds`, by default of `vocabulary`, that makes sense on the vehicle of `facts`.
 
     What the vehicle contains already (`Facts.has`) is no candidate.
     """
@@ -156,6 +156,9 @@ def named(term: Derivative, facts: Facts, kinds: tuple[type[AbstractEffect], ...
 
 
 def looked_at(facts: Facts, kinds: tuple[type[AbstractEffect], ...] | None = None) -> dict[str, int]:
-    """How many forms the candidates of each effect were chosen among, by its name, where they are not all."""
+    """By name, how many forms the candidates of each effect were chosen among on the vehicle of `facts`, where not all.
+
+    `kinds` are the effects, by default those of `vocabulary`.
+    """
     counts = {kind.name: kind.looked_at(facts) for kind in (vocabulary() if kinds is None else kinds)}
     return {name: count for name, count in counts.items() if count}

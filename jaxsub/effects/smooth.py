@@ -85,7 +85,7 @@ class SmoothForce(AbstractForce):
 
 
 def variables(motion: Motion) -> dict[str, Signal]:
-    """What a force may follow, by the name that its user knows: velocities, positions, actuators, surroundings.
+    """What of `motion` a force may follow, by its name in files: velocities, positions, actuators, surroundings.
 
     A heading is taken within a turn, (-π, π].
     """

@@ -170,7 +170,7 @@ class Assessment:
 
 
 def assess(found: AbstractSearchEnd) -> Assessment:
-    """Whether a fit explains the runs that it was made of; σ that the vehicle leaves open has no test of size."""
+    """Whether the fit `found` explains its runs; σ that the vehicle leaves open has no test of size."""
     vehicle, runs = found.vehicle, found.runs
     error = found.model.error if isinstance(found, Solution) else output_errors(vehicle, runs, found.start)
     known = [output.sigma is not None for output in vehicle.layout.outputs]
@@ -189,8 +189,9 @@ def assess_residuals(
 ) -> Assessment:
     """Whether whitened residuals, in σ, are as noise would leave them.
 
-    `channels` are their names and `mask` says where they were measured. `fitted` counts the numbers that were fitted
-    to them, initial states included. `known` says whose σ was given and not estimated from them: all where it is None.
+    `channels` are the names of those of `residual` (R, K, c) and `mask` says where they were measured. `fitted` counts
+    the numbers that were fitted to them, initial states included. `known` says whose σ was given and not estimated from
+    them: all where it is None.
     """
     known = [True] * len(channels) if known is None else known
     measured = [c for c in range(len(channels)) if mask[..., c].any()]

@@ -19,7 +19,10 @@ def batch(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
 
 
 def side_by_side(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Runs:
-    """The same, with no more steps than linear damping needs: for a model whose steps are known."""
+    """`recordings` of `vehicle` as `batch` stacks them, with no more steps than linear damping needs.
+
+    It is for a model whose steps are known.
+    """
     layout = vehicle.layout
     check_units(layout, recordings)
     plain = jax.tree.map(np.asarray, vehicle)

@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 from ..arrays import quietly
 from ..errors import InputError
-from ..likelihood import summed_products
+from ..likelihood.blocks import summed_products
 from ..vehicle import AbstractVehicle
 from .problem import Problem
 

@@ -54,10 +54,10 @@ def estimate_disturbance(
 ) -> Disturbance:
     """The disturbance of largest restricted likelihood, or a better one than `start` where that is far from it.
 
-    The first of the `columns` is the residual; `prior` as for `restricted`. `averages` of the same columns, of runs too
-    long to be filtered sample by sample, are fitted beside them. Priors hold it loosely to the `start`, and its time
-    constants below half the longest run. It takes at most so many `steps`, for which it is compiled, in each of so many
-    `rounds`; in `jit` only one.
+    `system` is the model of the runs, linearised. The first of the `columns` is the residual; `prior` as for
+    `restricted`. `averages` of the same columns, of runs too long to be filtered sample by sample, are fitted beside
+    them. Priors hold it loosely to the `start`, and its time constants below half the longest run. It takes at most so
+    many `steps`, for which it is compiled, in each of so many `rounds`; in `jit` only one.
     """
     known = len(prior)
     whole = -(-known // _SIDE_BY_SIDE) * _SIDE_BY_SIDE

@@ -12,7 +12,8 @@ from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values, quietly
 from ..filter.vehicle import unfilterable
-from ..likelihood import BlockLinearised, Watch, concentrated_sigma, nobody, output_errors
+from ..likelihood import BlockLinearised, concentrated_sigma, output_errors
+from ..likelihood.blocks import Watch, nobody
 from ..programs import compiled
 from ..recording import Recording
 from ..recording.runs import Runs
@@ -159,7 +160,7 @@ class Solution(AbstractSearchEnd):
 
 @quietly
 def channel_rms(residual: Values, runs: Runs, channels: tuple[str, ...]) -> dict[str, float]:
-    """rms of whitened residuals by channel, over what was measured."""
+    """rms of a whitened `residual` (R, K, c) of `runs` by the names `channels`, over what was measured."""
     samples = np.sum(np.asarray(runs.mask), axis=(0, 1))
     mean_square = np.sum(np.asarray(residual) ** 2, axis=(0, 1)) / np.maximum(samples, 1.0)
     return dict(zip(channels, np.sqrt(mean_square).tolist(), strict=True))
@@ -229,7 +230,10 @@ def search(
 
 
 def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " c"]) -> SearchEnd:
-    """The best of searches from several vehicles, as `search` finds it; those that fall behind are given up."""
+    """The best of searches from several `vehicles`, as `search` finds it; those that fall behind are given up.
+
+    `runs` are stacked recordings, and `sigma` (c,) is the noise of their channels, SI.
+    """
     begun = [Problem.of(vehicle, runs, sigma) for vehicle in vehicles]
     best = raced([Descent(gauss_newton(), problem, problem.coordinates()) for problem in begun])
     found = best.found.one(0)
@@ -299,7 +303,7 @@ def _improbable(found: Solution) -> float:
 
 
 def evaluate(ended: AbstractSearchEnd, watch: Watch = nobody) -> Solution:
-    """The statistics of an end; itself where it has them. `watch` is called with the share of samples done."""
+    """The statistics of `ended`; itself where it has them. `watch` is called with the share of samples done."""
     if isinstance(ended, Solution):
         return ended
     problem = ended.problem

@@ -17,9 +17,10 @@ _MEMORY = 0.1
 
 
 def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r s"], Float[Array, " s"]]:
-    """Initial states from the first sample of each state's channel, else at rest; and their standard deviations.
+    """Initial states (R, s) of `runs` of `vehicle`, and their standard deviations (s,), SI.
 
-    A run's deviation of a number that differs by run has that between runs, and none while it is not known.
+    They are from the first sample of each state's channel, else at rest. A run's deviation of a number that differs by
+    run has the standard deviation between runs, and none while that is not known.
 
     A sensor that starts late measures a state that may have changed since the run began: the standard deviation is then
     at least the rms change of its channel over so long a time.
@@ -50,7 +51,7 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
 
 
 def rest(vehicle: AbstractVehicle, count: int) -> Float[Array, "r s"]:
-    """`count` initial states at the origin and at rest; a body that surges does so at its operating speed."""
+    """`count` initial states (R, s) of `vehicle`, SI: at the origin and at rest, a body at its operating speed."""
     return jnp.asarray(np.tile(_resting(vehicle), (count, 1)))
 
 
@@ -62,7 +63,7 @@ def _resting(vehicle: AbstractVehicle) -> Float[np.ndarray, " s"]:
 
 
 def state_channels(layout: Layout) -> dict[str, str]:
-    """By state the output that measures it, of those states that have one; the state itself before other forms."""
+    """By state of `layout` the output that measures it, where there is one; the state itself before other forms."""
     among = {name: [o for o in layout.outputs if o.state == name] for name in layout.states}
     # false comes before true
     other = lambda output: output.channel != output.name

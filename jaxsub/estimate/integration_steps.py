@@ -59,7 +59,7 @@ def fastest(vehicle: AbstractVehicle, motion: Motion) -> float:
 def substeps_for(vehicle: AbstractVehicle, runs: Runs, motion: Motion, most: float = _TOO_MUCH) -> int:
     """Integration steps in a sample interval of `runs`, as they are or as many as effects need along a `motion`.
 
-    They stay while a step is no longer than `most` over the fastest rate.
+    The effects are those of `vehicle`. Steps stay while one is no longer than `most` over the fastest rate.
     """
     turned = float(np.max(np.asarray(runs.steps))) * fastest(vehicle, motion)
     return substeps_of(turned, runs.substeps) if turned > most * runs.substeps else runs.substeps
@@ -99,8 +99,9 @@ def _followed_free(vehicle: AbstractVehicle, runs: Runs) -> int:
 def substeps_unseen(vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Values) -> int:
     """Steps in a sample interval of which half as long ones change no channel by much of its noise `sigma` (c,), rms.
 
-    As `runs` are where it diverges however fine its steps. Source: Hairer, Nørsett and Wanner (1993), Solving Ordinary
-    Differential Equations I, ch. II.4 (step doubling).
+    `vehicle` is simulated along `runs` from the initial states `start` (R, s), SI. As `runs` are where it diverges
+    however fine its steps. Source: Hairer, Nørsett and Wanner (1993), Solving Ordinary Differential Equations I, ch.
+    II.4 (step doubling).
     """
     steps, finite = runs.substeps, True
     while steps < FINEST:

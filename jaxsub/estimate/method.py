@@ -51,7 +51,7 @@ C = TypeVar("C", bound=Costed)
 
 
 def by_cost(found: Iterable[C]) -> list[C]:
-    """Those of the least `cost` first, and what has no finite one last."""
+    """`found` in order of `cost`, the least first, and what has no finite one last."""
     return sorted(found, key=lambda one: float(one.cost) if np.isfinite(float(one.cost)) else np.inf)
 
 

@@ -104,8 +104,9 @@ def posterior(found: Solution, *, draws: int = 1000, warmup: int = 300, chains: 
 
     Group `posterior` holds each free coefficient under its name (chain, draw), `initial_state` (chain, draw, run,
     state) where it is not known, and `sigma` (chain, draw, channel) of the channels where it is estimated, all SI and
-    coefficients with their `units`; `sample_stats` holds `diverging` and the like. The chains start about the fit, its
-    covariance is their metric and is not adapted; the step is, in `warmup` draws that are thrown away.
+    coefficients with their `units`; `sample_stats` holds `diverging` and the like. There are `draws` in each of
+    `chains`, drawn by `seed`. The chains start about the fit, its covariance is their metric and is not adapted; the
+    step is, in `warmup` draws that are thrown away.
 
     Raises InputError without the packages of `pip install 'jaxsub[bayes]'`, and for a fit that leaves a direction open.
     """

@@ -13,8 +13,10 @@ from jaxtyping import Array, Bool, Float
 
 from ..arrays import quietly
 from ..errors import InputError
-from ..likelihood import Watch, errors, nobody, summed_products, value_and_columns
+from ..likelihood import errors
+from ..likelihood.blocks import Watch, nobody, summed_products
 from ..likelihood.march import March
+from ..likelihood.sensitivity import value_and_columns
 from ..parameters import Transform
 from ..programs import compiled
 from ..recording.runs import Runs

@@ -29,13 +29,16 @@ class Ends(eqx.Module):
 
 
 def ends(problem: Problem, found: Found, outputs: Float[Array, "n r k c"] | None = None) -> Ends:
-    """What `evaluate` says of a `Solution`, of every search that `found` holds. Not to be called in `jit`."""
-    theta, errors, away = in_shares(_told, None, problem, found.y, outputs)
+    """What `evaluate` says of a `Solution`, of every search on `problem` that `found` holds. Not to be called in `jit`.
+
+    `outputs` (n, R, K, c), SI, are the measured outputs of each search, where each has its own.
+    """
+    theta, errors, away = in_shares(_evaluated, None, problem, found.y, outputs)
     return Ends(theta, errors, away, _judged(problem, theta, away, found.result))
 
 
 @compiled
-def _told(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array | None) -> tuple[Array, Array, Array]:
+def _evaluated(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array | None) -> tuple[Array, Array, Array]:
     of, p = problems(problem, outputs), len(problem.prior_mean)
 
     def one(part: tuple[Array, Array]) -> tuple[Array, Array, Array]:

@@ -20,7 +20,7 @@ _PAIRS = 20_000_000
 def scattered(problem: Problem, spread: float, count: int, seed: int) -> Float[Array, "n d"]:
     """Coordinates of `count` starts, each parameter drawn uniformly within ± `spread` of the size it has in `problem`.
 
-    A spread of 1 draws from zero to twice each value. Initial states start at their guess.
+    A `spread` of 1 draws from zero to twice each value, by `seed`. Initial states start at their guess.
     """
     draws = np.random.default_rng(seed).uniform(-spread, spread, (count, len(problem.origin)))
     return _moved(problem, jnp.asarray(draws))
@@ -72,7 +72,7 @@ MARGIN = 0.1  # in cost: under half a standard error away
 
 
 def success(found: Found, best: float, margin: float = MARGIN) -> Rate:
-    """How many searches came within `margin` of the least cost known.
+    """How many of the searches `found` came within `margin` of the least cost known, `best`.
 
     One that failed, or whose cost is not a number, is no success and is counted.
     """
@@ -90,7 +90,7 @@ class Basin:
 
 
 def basins(problem: Problem, found: Found) -> tuple[list[Basin], int]:
-    """The ends clustered, the lowest first, and how many searches have no finite end.
+    """The ends `found` on `problem`, clustered, the lowest first, and how many searches have no finite end.
 
     Ends belong together where one can go from each to the next in steps shorter than a standard error, as the
     curvature at the best end has them.

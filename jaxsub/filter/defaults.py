@@ -24,9 +24,10 @@ _PARTNERS = dict(zip("uvwpqr", ("x", "y", "z", "phi", "theta", "psi"), strict=Tr
 
 
 def state_scale(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values, " s"]:
-    """For each state the noise of its channel, SI; else that of its rate or its integral over a second; else usual.
+    """For each state of `vehicle` the noise of its channel in `sigma` (c,), SI; else that of its rate or its integral.
 
-    A deviation of a number that differs by run has that between runs, none where it is not known.
+    Those are over a second; where there is none it is a usual size. A deviation of a number that differs by run has
+    that between runs, none where it is not known.
     """
     layout = vehicle.layout
     plain = layout.plain
@@ -45,7 +46,10 @@ def state_scale(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[V
 def vehicle_filter(
     process: VehicleProcess, sigma: Float[Array, " c"], kind: Callable[..., AbstractFilter] = ModifiedKalmanFilter
 ) -> AbstractFilter:
-    """A filter of `process` with sensors of noise `sigma` (SI), the state's initial and process noise in its terms."""
+    """A filter of `process` with sensors of noise `sigma` (c,), SI.
+
+    The state's initial covariance and process noise are in terms of that noise. `kind` is the class of the filter.
+    """
     scale = state_scale(process.vehicle, sigma)
     layout = process.vehicle.layout
     moving = jnp.array([name not in layout.deviations for name in layout.states])

@@ -65,14 +65,14 @@ class AbstractProcess(eqx.Module):
 
 
 def select(which: Bool[Array, ""], one: PyTree[Array], other: PyTree[Array]) -> PyTree[Array]:
-    """All of `one` or all of `other`."""
+    """All of `one` where `which` is true, else all of `other`; by leaf."""
     return jax.tree.map(lambda a, b: jnp.where(which, a, b), one, other)
 
 
 def linearised(
     f: Callable[[Array, Array], Array], change: Float[Array, " s"], theta: Float[Array, " p"]
 ) -> tuple[Float[Array, " m"], Float[Array, "m s"], Float[Array, "m p"]]:
-    """The value of `f` at a change of the state and θ, and its Jacobians by both."""
+    """The value of `f` at a `change` (s,) of the state and at `theta` (p,), and its Jacobians by both."""
     # one argument at a time: what depends on the parameters alone, such as a matrix exponential, has no state tangents
     value, by_change = _columns(lambda change: f(change, theta), change)
     if not theta.size:

@@ -13,9 +13,10 @@ from .model import Sample
 def over_runs(
     filter: AbstractFilter, state: FilterState, samples: Sample, starts: Float[Array, "r n"]
 ) -> tuple[FilterState, Estimate]:
-    """The state after R runs of K samples and what was known after each, (R, K) of them.
+    """The state of `filter` after R runs of K `samples` and the estimates after each, (R, K) of them.
 
-    Every run starts from its own state of `starts`; the parameters and their covariance go from one run to the next.
+    It begins with `state`. Every run starts from its own state of `starts`, (R, n), SI; the parameters and their
+    covariance go from one run to the next.
     """
 
     def run(state: FilterState, part: tuple[Array, Sample]) -> tuple[FilterState, Estimate]:
@@ -51,11 +52,12 @@ def identify(
     theta_root: Float[Array, "p p"] | None = None,
     passes: int = 1,
 ) -> Identified:
-    """Parameters from `passes` over the same runs; each run starts from its own state of `starts`.
+    """Parameters from `passes` of `filter` over the same runs; each starts from its own state of `starts`, (R, n), SI.
 
-    Each pass takes its parameters from the one before and its uncertainty from `theta_root` again: data that were
-    counted once are not counted twice. `theta_root` is a square root of the covariance of `theta`, by default one: in a
-    `Transform`'s coordinates each parameter's own size, which holds back neither its sign nor its double.
+    `samples` are (R, K) of them. Each pass takes its parameters from the one before, the first `theta` (p,), and its
+    uncertainty from `theta_root` again: data that were counted once are not counted twice. `theta_root` is a square
+    root of the covariance of `theta`, by default one: in a `Transform`'s coordinates each parameter's own size, which
+    holds back neither its sign nor its double.
     """
     root = jnp.eye(theta.size, dtype=theta.dtype) if theta_root is None else theta_root
 

@@ -48,7 +48,7 @@ class _Passed(eqx.Module):
 
 
 def last(filter: AbstractFilter, state: FilterState) -> Smoothed:
-    """What is known after the last sample, from which a backward pass begins."""
+    """The estimate after the last sample, from the `state` of `filter`, from which a backward pass begins."""
     s = len(filter.x_root)
     return Smoothed(state.x, filter.form.covariance(state.joint)[:s, :s])
 

@@ -38,10 +38,11 @@ class CoefficientEstimate:
 
 
 def estimates(fit: Solution, said: Identifiability | None, coloured: Coloured | None) -> list[CoefficientEstimate]:
-    """The coefficients of a fit; what was not computed, because the command was ended, is None.
+    """The coefficients of `fit` with their standard errors and verdicts.
 
-    Where the residuals' disturbance could not be estimated, the standard errors for white noise are multiplied by the
-    largest rms of a channel, if that is above one.
+    `said` is what the recordings identify and `coloured` the covariance for coloured residuals; either is None where it
+    was not computed. Where the residuals' disturbance could not be estimated, the standard errors for white noise are
+    multiplied by the largest rms of a channel, if that is above one.
     """
     verdicts = {verdict.name: verdict for verdict in said.verdicts} if said else {}
     unit = {row.name: row.unit for row in fit.vehicle.layout.free}

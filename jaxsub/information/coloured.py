@@ -19,7 +19,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..estimate import Problem, Solution
-from ..likelihood import Adjoint, Disturbance, Linearised, System, Watch, carried_back, carried_to_start, nobody
+from ..likelihood import Disturbance, Linearised, System
+from ..likelihood.blocks import Watch, nobody
+from ..likelihood.disturbance import Adjoint, carried_back, carried_to_start
 from ..programs import compiled
 from ..recording.runs import Runs
 from .residual_disturbance import Directions, residual_disturbance, whitened_columns
@@ -45,7 +47,7 @@ class Coloured(eqx.Module):
 
 
 def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, watch: Watch = nobody) -> Coloured:
-    """The covariance of the fitted coefficients that allows for coloured residuals. NaN where the search failed.
+    """The covariance of the coefficients of `fit` that allows for coloured residuals. NaN where the search failed.
 
     The `disturbance` is estimated from the residuals where none is given. Coefficients at a bound are held there.
     `watch` is called with the share of both passes over the samples that is done.

@@ -14,7 +14,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..estimate import Problem, Solution
-from ..likelihood import BlockLinearised, Linearised, Watch, nobody
+from ..likelihood import BlockLinearised, Linearised
+from ..likelihood.blocks import Watch, nobody
 from ..programs import compiled
 from ..recording.runs import Runs
 from .residual_disturbance import whitened_columns

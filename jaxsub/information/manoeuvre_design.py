@@ -93,7 +93,7 @@ def design(
 
 
 def keeping(vehicle: AbstractVehicle, recording: Recording, limits: ManoeuvreLimits) -> Recording:
-    """`recording` with its inputs as `limits` allow: taken as commands, then made smaller until every limit holds.
+    """`recording` of `vehicle` with its inputs as `limits` allow: commands, then made smaller until every limit holds.
 
     **Raises** `InputError` as `design` does.
     """

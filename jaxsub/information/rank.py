@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from ..estimate import Assessment, Solution, assess
-from ..likelihood import Watch, nobody
+from ..likelihood.blocks import Watch, nobody
 from .directions import FRACTION, Directions, subset
 from .equivalence import Family, equivalent_systems
 from .excitation import Excitation
@@ -125,7 +125,7 @@ def identifiability(fit: Solution, assessment: Assessment | None = None, watch: 
 
 
 def identifiable_subset(fit: Solution) -> tuple[str, ...]:
-    """Free coefficients to hold at their file values so that the rest is identified; added mass is held first."""
+    """Free coefficients to hold at file values so that `fit` identifies the rest; added mass is held first."""
     if not fit.names:
         return ()
     still = np.asarray(fit.vehicle.mass_matrix())

@@ -21,11 +21,11 @@ from ..likelihood import (
     Disturbance,
     Linearised,
     System,
-    Watch,
     first_guess,
     group_means,
     padded_width,
 )
+from ..likelihood.blocks import Watch
 from ..programs import compiled
 from ..recording.runs import Runs
 

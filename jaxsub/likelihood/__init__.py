@@ -1,15 +1,12 @@
 """Likelihoods: probability density of a recording under a model, and its derivatives."""
 
 from .averages import Averages, group_means
-from .blocks import BlockLinearised, Watch, block_length, nobody, output_errors, summed_products
+from .blocks import BlockLinearised, output_errors
 from .disturbance import (
-    Adjoint,
     Columns,
     Disturbance,
     System,
     carried,
-    carried_back,
-    carried_to_start,
     covariance_derivatives,
     first_guess,
     padded_width,
@@ -22,10 +19,9 @@ from .disturbance import (
 from .innovation_products import part_length
 from .innovations import FilteredRuns, filter_runs
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
-from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise_runs, propagate, value_and_columns
+from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise_runs, propagate
 
 __all__ = [
-    "Adjoint",
     "Averages",
     "BlockLinearised",
     "Columns",
@@ -34,11 +30,7 @@ __all__ = [
     "Jacobians",
     "Linearised",
     "System",
-    "Watch",
-    "block_length",
     "carried",
-    "carried_back",
-    "carried_to_start",
     "concentrated_sigma",
     "covariance_derivatives",
     "errors",
@@ -49,7 +41,6 @@ __all__ = [
     "jacobians",
     "linearise_runs",
     "negative_log_likelihood",
-    "nobody",
     "output_errors",
     "padded_width",
     "part_length",
@@ -58,8 +49,6 @@ __all__ = [
     "residual_outputs",
     "restricted",
     "smoothed",
-    "summed_products",
     "total_products",
-    "value_and_columns",
     "whitened",
 ]

@@ -65,9 +65,10 @@ class Averages(eqx.Module):
 
 @compiled
 def group_means(system: System, shown: Float[Array, "r k c q"], groups: int) -> tuple[System, Float[Array, "r j1 c q"]]:
-    """The `groups` groups that the intervals of a block make, as `Averages` has them, and the means of `shown`.
+    """The `groups` groups that the intervals of a block of `system` make, as `Averages` has them, and means of `shown`.
 
-    Each sample belongs to the group whose interval it begins, so the last one to none.
+    `shown` (R, K, c, q) are columns. Each sample belongs to the group whose interval it begins, so the last one to
+    none.
     """
     (r, k1), s, c = system.intervals.shape, system.A.shape[-1], system.C.shape[2]
     n, length = system.G.shape[-1] // 2, -(-k1 // groups)

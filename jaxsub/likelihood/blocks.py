@@ -145,7 +145,10 @@ def _passed(
 
 
 def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
-    """Measured minus predicted outputs in SI, zero where nothing was measured. Not to be called in `jit`."""
+    """Measured minus modelled outputs of `vehicle` over `runs`, (R, K, c) in SI, zero where nothing was measured.
+
+    `start` (R, s) are the initial states, SI. Long runs are taken in blocks. Not to be called in `jit`.
+    """
     length, errors, state = block_length(vehicle, runs), [], start
     turns = jax.device_put(np.full((len(start), len(vehicle.layout.channels)), np.nan, start.dtype))
     for block in _blocks(runs, length, nobody):

@@ -101,7 +101,10 @@ class Columns(eqx.Module):
 
 @compiled
 def first_guess(system: System, residual: Float[Array, "r k c"]) -> Disturbance:
-    """Where to start looking: in each equation a force whose lasting effect is as large as the `residual`."""
+    """A disturbance to start from: in each equation a force whose lasting effect is as large as the residual.
+
+    `system` is the linearised model, and `residual` (R, K, c) is in σ.
+    """
     n, r = system.G.shape[3] // 2, len(system.intervals)
     steady = system.G[..., :n] + system.G[..., n:]
     response = system.C @ propagate(system.A, steady, jnp.zeros((r, system.A.shape[-1], n)))
@@ -127,17 +130,20 @@ def restricted(gram: Float[Array, "q q"], spread: Float[Array, ""]) -> Float[Arr
 def whitened(
     disturbance: Disturbance, system: System, columns: Columns
 ) -> tuple[Float[Array, "r k c q"], Float[Array, "r k c c"]]:
-    """The innovations of every column, whitened, and the lower Cholesky factors of their covariance."""
+    """The innovations of all `columns`, whitened, (R, K, c, q), and the lower Cholesky factors of their covariance.
+
+    They are those of a filter of `system` under `disturbance`.
+    """
     return passes(*steps(disturbance, system, columns), lambda passed: (passed.white, passed.factor))
 
 
 def part_products(
     disturbance: Disturbance, system: System, columns: Columns, parts: int
 ) -> tuple[Float[np.ndarray, "r m q q"], Float[np.ndarray, "r m"]]:
-    """Products of all columns whitened, in each of `parts` of every run; half the log-determinant of each part.
+    """Products of all `columns` whitened, in each of `parts` of every run; half the log-determinant of each part.
 
-    Columns are padded to one of a few widths, so that one program serves many numbers of them. Not to be called in
-    `jit`.
+    The innovations are those of `system` under `disturbance`. Columns are padded to one of a few widths, so that one
+    program serves many numbers of them. Not to be called in `jit`.
     """
     count = columns.shown.shape[-1]
     found, spreads = _part_products(disturbance, system, columns.padded(padded_width(count)), parts)
@@ -148,7 +154,10 @@ def part_products(
 def total_products(
     disturbance: Disturbance, system: System, columns: Columns
 ) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
-    """Products of all columns whitened, and half the log-determinant of the residuals' covariance."""
+    """Products (q, q) of all `columns` whitened, and half the log-determinant of the residuals' covariance.
+
+    The covariance is that of `system` under `disturbance`.
+    """
     return innovation_products(*steps(disturbance, system, columns))
 
 
@@ -225,9 +234,9 @@ class Adjoint(NamedTuple):
 def carried(disturbance: Disturbance, system: System, weights: Float[Array, "r k c p"]) -> Float[Array, "p p"]:
     r"""$\sum_r W_r^T\Gamma_r W_r$ with $\Gamma$ the residuals' covariance under `disturbance`, initial states known.
 
-    By the adjoint recursion, one pass backwards through each run that keeps no sample: with $\lambda_k$ the weights'
-    lever on the state, $a_k$ theirs on the force and $f_k = a_k + \rho_k f_{k+1}$, forces of unit variance contribute
-    $\sum_k a_kf_k^T + f_ka_k^T - a_ka_k^T$.
+    `system` is the linearised model, and `weights` (R, K, c, p) are W. By the adjoint recursion, one pass backwards
+    through each run that keeps no sample: with $\lambda_k$ the weights' lever on the state, $a_k$ theirs on the force
+    and $f_k = a_k + \rho_k f_{k+1}$, forces of unit variance contribute $\sum_k a_kf_k^T + f_ka_k^T - a_ka_k^T$.
     """
     end = Adjoint.at_end(len(weights), system.A.shape[-1], len(disturbance.force), weights.shape[-1])
     adjoint = carried_back(disturbance, system, weights, end)
@@ -274,7 +283,8 @@ def covariance_derivatives(
 ) -> Float[Array, "r k c m"]:
     r"""$\Gamma_i W$ with $\Gamma_i$ the derivatives of the residuals' covariance by log q, log τ and log κ, in order.
 
-    A pass backwards for the forces that `weights` weigh, and one forwards for what each force, correlated, shows.
+    The covariance is that of `system` under `disturbance`; `weights` (R, K, c) are W. A pass backwards for the forces
+    that they weigh, and one forwards for what each force, correlated, shows.
     """
     asked = _asked(system, weights[..., None])
     kept = lambda log_time: _correlated(jnp.exp(log_time), system.intervals, asked)[..., 0]
@@ -329,9 +339,10 @@ def _correlated(
 def smoothed(
     disturbance: Disturbance, system: System, column: Columns
 ) -> tuple[Float[Array, "r k n"], Float[Array, "r k n"]]:
-    """The disturbance force (N, N m) of one `column` given all of its samples, and its standard deviation.
+    """The disturbance force (N, N m) of one `column`, given all of its samples, and its standard deviation; (R, K, n).
 
-    The adjoint form of the smoother, which inverts no covariance of the state. Source: Bierman (1973), Automatica 9.
+    The force is of `disturbance` on `system`. The adjoint form of the smoother, which inverts no covariance of the
+    state. Source: Bierman (1973), Automatica 9.
     """
     F, B = transition(disturbance, system)
     s, n = system.C.shape[-1], len(disturbance.force)

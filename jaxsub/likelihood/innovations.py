@@ -58,9 +58,10 @@ def filter_runs(
     start: Float[Array, "r s"],
     spread: Float[Array, " s"],
 ) -> FilteredRuns:
-    """`vehicle` filtered along `runs` from initial states of mean `start` and standard deviation `spread`.
+    """`vehicle` filtered along `runs`, from initial states of mean `start` (R, s) and standard deviation `spread` (s,).
 
-    `sigma` is the noise of the channels, SI, in whose units the columns are.
+    Both are SI. `sigma` (c,) is the noise of the channels, SI, in whose units the columns are, and `disturbance` that
+    of the forces.
     """
     expected, filtered, force, push = _path(vehicle, runs, sigma, disturbance, start, spread)
     by = jacobians(vehicle, runs, filtered, expected, push)

@@ -18,7 +18,10 @@ _TURN = 2.0 * jnp.pi
 
 
 def errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k c"]:
-    """Measured minus modelled outputs in SI from the initial states `start`, zero where nothing was measured."""
+    """Measured minus modelled outputs of `vehicle` over `runs`, (R, K, c) in SI, zero where nothing was measured.
+
+    `start` (R, s) are the initial states, SI.
+    """
     return residual_outputs(vehicle, runs, simulate(vehicle, runs, start))
 
 
@@ -28,7 +31,7 @@ def residual_outputs(
     modelled: Float[Array, "r k c"],
     turns: Float[Array, "r c"] | None = None,
 ) -> Float[Array, "r k c"]:
-    """`wrapped_errors` of what a vehicle shows."""
+    """`wrapped_errors` of outputs `modelled` (R, K, c), SI, of `vehicle` over `runs`; `turns` (R, c) are as there."""
     return wrapped_errors(vehicle.turning, runs, modelled, turns)
 
 
@@ -69,14 +72,17 @@ def first_turns(
 
 
 def concentrated_sigma(error: Float[Array, "r k c"], runs: Runs) -> Float[Array, " c"]:
-    """The standard deviation of each channel that maximises the likelihood given its errors: their rms."""
+    """The standard deviation (c,) of each channel that maximises the likelihood of `error` over `runs`: the rms."""
     return jnp.sqrt(jnp.sum(error**2, (0, 1)) / jnp.maximum(runs.samples(), 1.0))
 
 
 def negative_log_likelihood(
     vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"], sigma: Float[Array, " c"] | None = None
 ) -> Float[Array, ""]:
-    """-ln p up to its constant; `sigma` (SI, per channel) is concentrated out where it is None."""
+    """-ln p of the outputs of `runs` under `vehicle`, up to a constant.
+
+    `start` (R, s) are the initial states, SI; `sigma` (c,), SI, is concentrated out where it is None.
+    """
     error = errors(vehicle, runs, start)
     scale = concentrated_sigma(error, runs) if sigma is None else sigma
     return 0.5 * jnp.sum((error / scale) ** 2) + jnp.sum(runs.samples() * jnp.log(scale))

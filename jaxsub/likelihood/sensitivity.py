@@ -86,9 +86,10 @@ def jacobians(
     at: Float[Array, "r k s"],
     push: Float[Array, "r k1 2 n"],
 ) -> Jacobians:
-    """The steps taken from the states `before`, but the last, under the forces `push`; the outputs `at` other states.
+    """Jacobians of the steps of `vehicle` from the states `before`, but the last, and of its outputs at states `at`.
 
-    `push` (N, N m) acts at the start and end of each interval, and is linear between.
+    Both are (R, K, s), SI, at the samples of `runs`. `push` (R, K-1, 2, n), N or N m, are forces at the start and end
+    of each interval, linear between.
     """
     names = [row.name for row in vehicle.layout.free]
     values = vehicle.values()
@@ -162,7 +163,7 @@ class Checkpoint(eqx.Module):
 
 
 def linearise_runs(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Linearised:
-    """`vehicle` along its trajectory from the initial states `start`."""
+    """`vehicle` linearised along its trajectory over `runs` from the initial states `start` (R, s), SI."""
     at = Checkpoint.at_start(vehicle, start)
     return along(vehicle.turning, runs, at, *with_jacobians(vehicle, runs, at))[0]
 
@@ -194,7 +195,10 @@ def along(
 def force_columns(
     model: Linearised, start_force: Float[Array, "r k1 n q"], end_force: Float[Array, "r k1 n q"]
 ) -> Float[Array, "r k c q"]:
-    """What q extra generalised forces, given at the start and end of each interval (N, N m), do to the outputs."""
+    """What q extra generalised forces do to the outputs of the linearised `model`, (R, K, c, q), SI by N or N m.
+
+    `start_force` and `end_force` (R, K-1, n, q) are the forces at the start and end of each interval, N or N m.
+    """
     forcing = model.G @ jnp.concatenate([start_force, end_force], axis=2)
     r, s, q = forcing.shape[0], forcing.shape[2], forcing.shape[3]
     return model.C @ propagate(model.A, forcing, jnp.zeros((r, s, q)))

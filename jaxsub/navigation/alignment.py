@@ -63,7 +63,7 @@ class Alignment(eqx.Module):
 
 
 def aligned(accelerometer: Float[Array, "3"], magnetometer: Float[Array, "3"]) -> Alignment:
-    """From mean readings, m/s² and any unit, body axes.
+    """The attitude at rest by mean readings of `accelerometer` (3,), m/s², and `magnetometer` (3,), any unit.
 
     In free fall, or where a reading is not finite, nothing is known; without a field, or where it is vertical, all but
     the heading is. Nose or tail up, roll is zero and the yaw is all of the turn. Heading is magnetic.

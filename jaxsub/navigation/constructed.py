@@ -86,9 +86,10 @@ def constructed_attitude(
     heading: Float[Array, ""] | None = None,
     limits: Limits = Limits(),
 ) -> ConstructedAttitude:
-    """The attitude in the middle of a `Window`.
+    """The attitude in the middle of a `Window` of three `fixes` (3, 3), m, a row each, at `times` (3,), s.
 
-    A finite `heading`, rad, of the middle of the window stands for the track.
+    `accelerometer` (3,) is its mean reading over the window, m/s². A finite `heading`, rad, of the middle of the window
+    replaces the track.
 
     An angle is unknown, its value then no more than finite, where
 
@@ -125,9 +126,10 @@ def standard_deviations(
 ) -> Float[Array, "3"]:
     r"""Standard deviations of φ, θ, ψ, rad, to first order: roots of the diagonal of $J\Sigma J^T$.
 
-    `position_std` is of what differs from fix to fix, m, since an error common to the three fixes drops out;
-    `accelerometer_std` of the mean over the window, m/s², bias included; `heading_std` of a given heading. An unknown
-    angle has π/√3, the deviation of one that may be anything, and no angle has more.
+    `fixes`, `times`, `accelerometer`, `heading` and `limits` are as of `constructed_attitude`. `position_std` (3,) is
+    of what differs from fix to fix, m, since an error common to the three fixes drops out; `accelerometer_std` (3,) of
+    the mean over the window, m/s², bias included; `heading_std` of a given heading, rad. An unknown angle has π/√3, the
+    deviation of one that may be anything, and no angle has more.
     """
     course = jnp.zeros((), fixes.dtype) if heading is None else heading
 
@@ -245,8 +247,9 @@ def constructed_over(
 ) -> ConstructedAttitude:
     """The attitudes along a recording, (K,) of them, known where a third fix arrives: `step` scanned.
 
-    `fixes` are m, a row a sample, of which those `present` count; a `heading`, rad, at a fix is that of the middle of
-    the window which the fix ends.
+    `times` (K,) are s, `accelerometer` (K, 3) m/s² and `fixes` (K, 3) m, a row a sample, of which those `present` (K,)
+    count; a `heading` (K,), rad, at a fix is that of the middle of the window which the fix ends. `limits` are as of
+    `constructed_attitude`.
     """
     stream = ConstructedAttitudeStream.start(limits, accelerometer.dtype)
     samples = times, accelerometer, fixes, present, heading

@@ -231,7 +231,10 @@ class Stream(AbstractStream):
 
 @compiled
 def follow(stream: AbstractStream, state: Any, readings: Any) -> tuple[Any, Any]:
-    """The state after K readings, stacked, and what was known after each; `jax.vmap` over many recordings."""
+    """The state of `stream` after K `readings`, stacked, from `state`, and the estimates after each.
+
+    `jax.vmap` takes it over many recordings.
+    """
     return jax.lax.scan(lambda state, reading: stream.step(state, reading), state, readings)
 
 

@@ -7,7 +7,7 @@ from jaxsub.recording.recording import Recording
 
 
 def split(recording: Recording, fraction: float = 0.7) -> tuple[Recording, Recording]:
-    """Divide a run at `fraction` of its duration into (first, rest), which share no sample.
+    """Divide `recording` at `fraction` of its duration into (first, rest), which share no sample.
 
     Raises InputError when either would have fewer than two samples.
     """
@@ -20,7 +20,7 @@ def split(recording: Recording, fraction: float = 0.7) -> tuple[Recording, Recor
 
 
 def hold_out(recordings: Sequence[Recording], fraction: float = 0.7) -> tuple[list[Recording], list[Recording]]:
-    """Return (training, test): the test run is the last or, of a single run, what follows `fraction` of its duration.
+    """Return (training, test): the last of `recordings` is the test run or, of a single one, what follows `fraction`.
 
     Raises InputError when there is no run, or a single run is too short to divide.
     """

@@ -36,12 +36,12 @@ def load(
     held: Collection[str] = (),
     interpolated: Collection[str] = (),
 ) -> Recording:
-    """Read a file with a recording, or `columns` of a vehicle's log; the run is named after it.
+    """Read the file `path` with a recording, or `columns` of a vehicle's log; the run is named after it.
 
     The file is .csv, .tsv or .txt, .parquet, .nc, .mat, .xlsx, or a .zip of one of these, `runs.zip!dive.csv` where it
-    holds several. How it was read is in the run's findings, where that is not plain. The rest is for logs alone and
-    handed to `load_log`. Raises InputError, naming the file and where it applies the row and column, whatever the file
-    holds.
+    holds several. How it was read is in the run's findings, where that is not plain. `columns`, `held` and
+    `interpolated` are for logs alone and handed to `load_log`. Raises InputError, naming the file and where it applies
+    the row and column, whatever the file holds.
     """
     path = Path(path)
     if is_log(path):
@@ -56,7 +56,7 @@ def load(
 
 
 def load_in_order(path: str | os.PathLike[str]) -> Recording:
-    """The file of a recording, as `load` reads it, without the fewest rows that leave its times in order.
+    """The recording in the file `path`, as `load` reads it, without the fewest rows that leave its times in order.
 
     A warning in its findings counts them. Raises InputError as `load` does, and where less than half would be left.
     """
@@ -70,7 +70,7 @@ def is_log(path: Path) -> bool:
 
 
 def contents(path: str | os.PathLike[str]) -> Listing:
-    """What a log or the file of a recording holds: name, unit where it states one, and number of samples.
+    """What the log or recording at `path` holds: name, unit where it states one, and number of samples.
 
     A column that holds no numbers has no samples. The findings say how the file was read, where that is not plain, and
     what of an incomplete log is lost. Raises InputError for a file that cannot be read.
@@ -108,10 +108,11 @@ def read(path: Path) -> tuple[Contents, str, str]:
 
 
 def save(recording: Recording, path: str | os.PathLike[str], units: Units | None = None) -> None:
-    """Write a .csv, .parquet or .nc file, in SI but for the columns that `units` names a unit for.
+    """Write `recording` to `path`, a .csv, .parquet or .nc file.
 
-    A save that fails leaves an older file as it was. Raises InputError for an unknown extension, column or unit, a
-    column name that the format cannot hold, and a path that cannot be written.
+    Columns are in SI but for those that `units` names a unit for. A save that fails leaves an older file as it was.
+    Raises InputError for an unknown extension, column or unit, a column name that the format cannot hold, and a path
+    that cannot be written.
     """
     path = Path(path)
     write = _of_suffix(_WRITERS, path, str(path))

@@ -43,7 +43,7 @@ def from_pandas(frame: "pandas.DataFrame", name: str = "run") -> Recording:
 
 
 def to_pandas(recording: Recording, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
-    """A frame as `from_pandas` reads it, in SI but for the columns that `units` names a unit for.
+    """`recording` as a frame that `from_pandas` reads, in SI but for the columns that `units` names a unit for.
 
     Raises InputError for an absent column or an unknown unit.
     """
@@ -62,9 +62,10 @@ def from_xarray(dataset: "xarray.Dataset", name: str = "run") -> Recording:
 
 
 def to_xarray(recording: Recording, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
-    """A dataset along `t` as `from_xarray` reads it, in SI but for the columns that `units` names a unit for.
+    """`recording` as a dataset along `t` that `from_xarray` reads.
 
-    Raises InputError for an absent column, an unknown unit or a name that NetCDF could not hold.
+    It is in SI but for the columns that `units` names a unit for. Raises InputError for an absent column, an unknown
+    unit or a name that NetCDF could not hold.
     """
     import xarray
 

@@ -64,7 +64,7 @@ class Recording:
         return float(self.times[-1]) - float(self.times[0])
 
     def column(self, name: str) -> np.ndarray:
-        """Return the samples of one column, (samples,). Raises InputError for one that is absent or unusable."""
+        """The samples of the column `name`, (samples,), SI. Raises InputError for one that is absent or unusable."""
         if name in self.columns:
             return self.columns[name]
         if name in self.unusable:

@@ -36,7 +36,7 @@ _NARROWEST = 0.004  # of the run: what is shorter could not be seen
 def draw_checked_runs(
     recordings: Sequence[Recording], channels: Sequence[tuple[str, str]], findings: Sequence[Finding]
 ) -> list[Picture]:
-    """For each run, as recorded, its `channels` (name and unit) over time with what `findings` say of them shaded.
+    """For each of `recordings`, its `channels` (name and unit) over time with what `findings` say of them shaded.
 
     The first 20 runs are drawn.
     """

@@ -87,7 +87,7 @@ class Picture:
 
 
 def write_figures(pictures: Iterable[Picture], folder: Path) -> None:
-    """Write each picture as `figures/NAME.png` into `folder`."""
+    """Write each of `pictures` as `figures/NAME.png` into `folder`."""
     figures = folder / "figures"
     figures.mkdir(parents=True, exist_ok=True)
     for picture in pictures:

@@ -29,7 +29,10 @@ _BAND = 2.0  # standard deviations
 
 
 def write_navigation_report(found: Navigation, content: dict[str, Any], folder: Path) -> None:
-    """Write `report.html`, which needs no other file, and `figures/*.png` into `folder`; `content` is the summary."""
+    """Write `report.html`, which needs no other file, and `figures/*.png` into `folder`.
+
+    They show the motion `found`; `content` is its summary, as `navigation.json` has it.
+    """
     with style():
         pictures = {picture.name: picture for picture in (_motion(found), _track(found), _innovations(found))}
     write_figures(pictures.values(), folder)

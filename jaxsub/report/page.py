@@ -51,7 +51,8 @@ TITLE = "jaxsub: differentiable models of vehicles that move in water, and a dia
 def write_report(diagnosis: Conclusions, vehicle_text: str, folder: Path) -> None:
     """Write `report.html`, which needs no other file, and `figures/*.png` into `folder`.
 
-    `vehicle_text` is the improved vehicle file, of which the page shows the effects. Existing files are replaced.
+    They show `diagnosis`. `vehicle_text` is the improved vehicle file, of which the page shows the effects. Existing
+    files are replaced.
     """
     pictures = draw(diagnosis)
     write_figures(pictures.values(), folder)

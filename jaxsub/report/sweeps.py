@@ -18,7 +18,10 @@ _MOST_COEFFICIENTS, _MOST_POINTS, _REACH = 14, 400, 2.0
 
 
 def sweep_pictures(dataset: xarray.Dataset, summary: dict[str, Any]) -> list[Picture]:
-    """One figure for each vehicle on each set of recordings, named `sweep-VEHICLE-RECORDING`."""
+    """One figure for each vehicle on each set of recordings, named `sweep-VEHICLE-RECORDING`.
+
+    `dataset` has every search and `summary` what `sweep.json` has.
+    """
     cases = summary["cases"]
     with style():
         return [_draw(dataset.sel(vehicle=c["vehicle"], recording=c["recording"]), c) for c in cases]

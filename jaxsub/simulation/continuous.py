@@ -44,13 +44,13 @@ def integrate(
     atol: float = 1e-9,
     adjoint: "diffrax.AbstractAdjoint | None" = None,
 ) -> Float[Array, "r k s"]:
-    r"""States at the samples of `runs` of $\tilde M\dot\nu = \tilde A\nu + \tau$ from the initial states `start`.
+    r"""States (R, K, s) at the samples of `runs` of $\tilde M\dot\nu = \tilde A\nu + \tau$ of `vehicle`, SI.
 
-    Tsit5 with a step chosen by its error (`rtol`, `atol` in SI), restarted at every sample, so that no step spans a
-    jump of a held input: there a step that did would be rejected again and again, and the time of the jump would have
-    no derivative (diffrax issues 766 and 729). Inside an interval the signals follow the parabola through their values
-    at its start, middle and end; `runs.substeps` plays no part. A run that diverges becomes NaN there and stays so,
-    without an exception.
+    `start` (R, s) are the initial states, SI. Tsit5 with a step chosen by its error (`rtol`, `atol` in SI), restarted
+    at every sample, so that no step spans a jump of a held input: there a step that did would be rejected again and
+    again, and the time of the jump would have no derivative (diffrax issues 766 and 729). Inside an interval the
+    signals follow the parabola through their values at its start, middle and end; `runs.substeps` plays no part. A run
+    that diverges becomes NaN there and stays so, without an exception.
 
     The default `adjoint`, forward mode, gives `jax.jvp` and `jax.jacfwd`; for `jax.grad` pass
     `diffrax.RecursiveCheckpointAdjoint()`.

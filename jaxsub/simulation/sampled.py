@@ -109,11 +109,17 @@ def simulate(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -
 # whatever needs a trajectory has this program of it, since a loop over samples takes long to compile
 @compiled
 def sampled_states(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"]) -> Float[Array, "r k s"]:
-    """States at the samples of `runs` by the sampled step; `integrate` gives them by the continuous model."""
+    """States (R, K, s), SI, of `vehicle` at the samples of `runs` by the sampled step.
+
+    `start` (R, s) are the initial states, SI. `integrate` gives them by the continuous model.
+    """
     return Sampled.of(vehicle, runs).states(runs, start)
 
 
 @compiled
 def measure(vehicle: AbstractVehicle, runs: Runs, states: Float[Array, "r k s"]) -> Float[Array, "r k c"]:
-    """What the sensors show along `states`; the actuators' own dynamics are seen only through what they did."""
+    """Outputs (R, K, c), SI, of the sensors of `vehicle` along `states` (R, K, s) at the samples of `runs`.
+
+    The actuators' own dynamics are seen only through what they did.
+    """
     return vehicle.measure(runs.times, states, runs.signals)

@@ -125,7 +125,7 @@ class Manifest:
 def require_ours(out: Path, overwrite: str, remedy: str) -> None:
     """Raise `InputError` unless all that is at `out` was written by jaxsub and is as it was written.
 
-    `overwrite` is the option that would replace it.
+    `overwrite` is the option that would replace it, and `remedy` what the error says to do.
     """
     manifest = Manifest.of_folder(out) if out.is_dir() else Manifest.of_file(out)
     if not manifest.exists():
@@ -146,7 +146,7 @@ def installed_version(package: str) -> str:
 
 
 def size_and_digest(path: Path) -> dict[str, Any]:
-    """Size and SHA-256 of a file, by which it is known again."""
+    """Size and SHA-256 of the file at `path`, by which it is known again."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         return {"size": os.fstat(file.fileno()).st_size, "sha256": digest}

@@ -19,7 +19,7 @@ _PACKAGES = ("jaxsub", "jax", "equinox", "optimistix")
 
 
 def described(plan: Plan) -> dict[str, Any]:
-    """All that the answers depend on, as JSON has it; two plans are one where these are equal."""
+    """All that the answers of `plan` depend on, as JSON has it; two plans are one where these are equal."""
     return {
         "schema": SCHEMA,
         "starts": plan.starts,

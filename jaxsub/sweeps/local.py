@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Iterator, Sequence
 
-from ..estimate import share_for, shares_at_once
+from ..estimate.method import share_for, shares_at_once
 from .plan import Chunk, Plan
 from .run import Answers, run_chunks
 

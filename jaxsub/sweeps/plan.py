@@ -15,7 +15,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..errors import InputError
-from ..estimate import METHODS, Problem, batch, scattered_by_number, search, share_for, unknown_spreads
+from ..estimate import METHODS, Problem, batch, search
+from ..estimate.between_runs import unknown_spreads
+from ..estimate.method import share_for
+from ..estimate.starts import scattered_by_number
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
 

@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..estimate import METHODS, Problem, ends, share_for
+from ..estimate import METHODS, Problem, ends
+from ..estimate.method import share_for
 from ..results import RESULTS
 from .plan import Chunk, Plan
 
@@ -26,7 +27,7 @@ Answers = dict[str, np.ndarray]
 
 
 def run_chunks(plan: Plan, chunks: Sequence[Chunk]) -> list[Answers]:
-    """The answers of chunks of one case and, but for the last of the case, of one width.
+    """The answers of `chunks` of one case of `plan` and, but for the last of the case, of one width.
 
     Each is a dictionary of arrays over the chunk's n searches: `start`, `estimate` and `standard_error` (n, p) of the
     free coefficients, SI; `coordinates` (n, d) of the end; `cost`; `away`, how many standard errors the optimum may

@@ -6,8 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import xarray
 
-from ..estimate import MARGIN, Assessment, Found, Problem, Rate, assess_residuals, basins
+from ..estimate import Assessment, Found, Problem, Rate, assess_residuals, basins
 from ..estimate.method import problems
+from ..estimate.starts import MARGIN
 from ..likelihood import output_errors
 from ..results import SUCCESSFUL
 from .plan import Plan
@@ -42,7 +43,7 @@ def best_starts(case: xarray.Dataset) -> np.ndarray:
 
 
 def succeeded(case: xarray.Dataset) -> np.ndarray:
-    """(noise, start) whether a search came within `MARGIN` of the least cost known."""
+    """(noise, start) whether a search of `case` came within `MARGIN` of the least cost known."""
     cost = _costs(case)
     return cost < np.min(cost, axis=1, keepdims=True) + MARGIN
 

@@ -17,7 +17,7 @@ _POINTERS = ctypes.POINTER(ctypes.POINTER(ctypes.c_double))
 
 
 def write_c(function: "casadi.Function", path: Path) -> None:
-    """The function as C99 that needs `math.h` alone, and allocates nothing.
+    """Write `function` to `path` as C99 that needs `math.h` alone, and allocates nothing.
 
     It is called as `int NAME(const double** arg, double** res, long long* iw, double* w, int mem)`, where `arg` and
     `res` point to its arrays in and out, by columns, and `w` to the scratch memory whose size `NAME_work` tells.

@@ -3,16 +3,8 @@
 import dataclasses
 from collections.abc import Sequence
 
-from ..effects import (
-    AbstractDerivative,
-    AbstractEffect,
-    ActuatorGain,
-    Facts,
-    derivative,
-    named,
-    parameter_table,
-    with_numbers,
-)
+from ..effects import AbstractDerivative, AbstractEffect, ActuatorGain, Facts, derivative, parameter_table, with_numbers
+from ..effects.registry import named
 from ..parameters import Parameter, number
 from .actuators import Actuators, Rudder
 from .base import AbstractVehicle

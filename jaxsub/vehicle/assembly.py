@@ -69,12 +69,17 @@ def build(
 
     **Arguments**
 
-    - `numbers`: value and row of every body entry and coefficient; zero where the physics has one that is absent.
+    - `where`: what errors name. `name`: of the vehicle. `kind`: `submerged-body` or `mechanism`. `dof`: its free
+      equations.
+    - `numbers`: value (SI) and row of every body entry and coefficient; zero where the physics has one that is absent.
+    - `inputs`, `prescribed`, `environment`: actuators, locked motions and surroundings, each with its column.
+    - `outputs`: the measured channels.
     - `input_units`: SI units of inputs that have no symbol. `actuators`: those of a body; `numbers` has theirs too.
     - `sensor_numbers`: value and row of each scale, offset and mounting angle of a column.
     - `ties`: numbers that follow from others; `numbers` has them with any value.
     - `coriolis`: of a body, one of `CORIOLIS`. `system`: in which the file gives its coefficients, as text.
     - `hull`: `length`, `diameter` (m; worked out from mass and inertia where absent), `reference_density` (kg/m³).
+    - `effects`: those that the model has already, and `effect_rows` the rows of their free numbers.
 
     **Raises** `InputError` with `where` and the key for names it does not know, and for an inertia matrix that is
     not positive definite, with the coefficients that make it so.

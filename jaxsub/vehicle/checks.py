@@ -18,10 +18,10 @@ from ..effects import (
     AbstractInstrument,
     Derivative,
     Motion,
-    alike,
     options,
     parameter_table,
 )
+from ..effects.derivatives import alike
 from ..errors import InputError, nearest
 from .actuators import Actuator
 from .base import Layout
@@ -40,7 +40,10 @@ GRAMMAR = (
 
 
 def require_inertia(vehicle: SubmergedBody | Mechanism, where: str) -> None:
-    """Raise `InputError` naming the coefficients where the inertia matrix is not positive definite."""
+    """Raise `InputError` where the inertia matrix of `vehicle` is not positive definite.
+
+    It says `where` and names the coefficients.
+    """
     names = [n for n in vehicle.own_values() if n.endswith("dot") or n.startswith(("I_", "mass"))]
     guilty = indefinite(jax.tree.map(np.asarray, vehicle).mass_matrix(), vehicle.layout.equations, names)
     if guilty:

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from ..effects import derivative, unit_per
+from ..effects import derivative
+from ..effects.motion import unit_per
 
 _BODY = {
     "mass": "kg", "weight": "N", "buoyancy": "N", "speed": "m/s", "I_x": "kg*m^2", "I_y": "kg*m^2", "I_z": "kg*m^2",

@@ -2,7 +2,8 @@
 
 import dataclasses
 
-from ..effects import INPUT_UNITS, VELOCITIES
+from ..effects import VELOCITIES
+from ..effects.derivatives import INPUT_UNITS
 from ..parameters import Parameter
 from .sensors.output import ANGLES, SPECIFIC_FORCE, Output, channel_unit
 from .ties import Tie

@@ -5,7 +5,8 @@ from collections.abc import Collection, Iterable
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from ..effects import INPUT_SYMBOLS, Derivative, Motion, Power, Signal, derivative
+from ..effects import Derivative, Motion, Power, Signal, derivative
+from ..effects.derivatives import INPUT_SYMBOLS
 
 ACTUATORS = tuple(INPUT_SYMBOLS)
 _THRUST = Derivative("surge", (Power("thrust"),))

@@ -5,18 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..effects import (
-    EQUATIONS,
-    INPUT_UNITS,
-    AbstractEffect,
-    SmoothForce,
-    derivative,
-    option_fields,
-    parameter_table,
-    quantity_of,
-    vocabulary,
-    with_numbers,
-)
+from ..effects import EQUATIONS, AbstractEffect, SmoothForce, derivative, parameter_table, vocabulary, with_numbers
+from ..effects.base import option_fields
+from ..effects.derivatives import INPUT_UNITS
+from ..effects.motion import quantity_of
 from ..errors import InputError
 from ..parameters import Parameter
 from ..units import same_dimension
@@ -50,9 +42,10 @@ def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ())
 def vehicle_from(
     data: dict[str, Any], where: str, effects: Sequence[type[AbstractEffect]] = (), folder: Path | None = None
 ) -> SubmergedBody | Mechanism:
-    """The vehicle described by a parsed vehicle file; `where` names it in errors, `effects` are a user's own.
+    """The vehicle described by `data`, a parsed vehicle file; `where` names it in errors, `effects` are a user's own.
 
-    `folder` holds the files that it names, the working directory where absent.
+    `folder` holds the files that it names, the working directory where absent. **Raises** `InputError` as
+    `read_vehicle` does.
     """
     check_tree(data, where)
     top = Table(data, where, "")

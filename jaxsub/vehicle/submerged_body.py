@@ -10,7 +10,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..arrays import Values
-from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, AbstractFlow, Motion, Signal, coriolis, stream
+from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, AbstractFlow, Motion, Signal
+from ..effects.environment import stream
+from ..effects.hull import coriolis
 from ..parameters import number
 from .actuation import BodyActuation
 from .actuators import Actuators, stage_numbers

@@ -19,9 +19,10 @@ from .submerged_body import CORIOLIS, SubmergedBody
 
 
 def write_vehicle(vehicle: AbstractVehicle, path: str | Path, comment: str = "") -> None:
-    """Write `vehicle` so that `read_vehicle` gives it back, to the last digit.
+    """Write `vehicle` to the file `path` so that `read_vehicle` gives it back, to the last digit.
 
-    An older file stays as it was until the new one is whole. **Raises** `OutputError` where it cannot be written.
+    It begins with the lines of `comment`. An older file stays as it was until the new one is whole. **Raises**
+    `OutputError` where it cannot be written.
     """
     path = Path(path)
     try:
@@ -32,7 +33,7 @@ def write_vehicle(vehicle: AbstractVehicle, path: str | Path, comment: str = "")
 
 
 def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
-    """The vehicle file of `vehicle` as text."""
+    """The vehicle file of `vehicle` as text, which begins with the lines of `comment`."""
     layout, values = vehicle.layout, {name: float(v) for name, v in vehicle.values().items()}
     spreads = {name: float(spread) for name, spread in vehicle.spreads.items()}
     known = {name: spread if spread > 0.0 else 0.0 for name, spread in spreads.items()}

@@ -9,8 +9,8 @@ import pytest
 from rigs import driven, oscillator, stacked
 
 from jaxsub.errors import InputError
-from jaxsub.estimate import Problem, share_for, shares_at_once
-from jaxsub.estimate.method import bytes_of_a_lane, lanes_for
+from jaxsub.estimate import Problem
+from jaxsub.estimate.method import bytes_of_a_lane, lanes_for, share_for, shares_at_once
 from jaxsub.simulation import synthetic
 
 

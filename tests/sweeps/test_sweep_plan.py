@@ -9,7 +9,7 @@ from scipy import stats
 from sweep_cases import plan, recordings, vehicle
 
 from jaxsub.errors import InputError
-from jaxsub.estimate import share_for
+from jaxsub.estimate.method import share_for
 from jaxsub.sweeps import Plan
 
 

@@ -50,7 +50,7 @@ def load_log(
     held: Collection[str] = (),
     interpolated: Collection[str] = (),
 ) -> Recording:
-    """The columns of `selection` as one recording, named after the log.
+    """The columns of `selection` in the log at `path` as one recording, named after the log.
 
     `held` columns are held between their samples and `interpolated` ones are joined by lines, as a vehicle takes its
     inputs and its prescribed motions; `merged` says how the rest finds its rows. What of the log is lost is a

@@ -59,7 +59,7 @@ class Selection:
 
 
 def read_selection(path: str | os.PathLike[str]) -> Selection:
-    """Read a TOML file with a table `[columns]` and, before it, perhaps `every`, `start` and `end`.
+    """Read the TOML file `path` with a table `[columns]` and, before it, perhaps `every`, `start` and `end`.
 
     Raises InputError, naming the file and the key, for whatever else the file holds.
     """

@@ -26,7 +26,7 @@ _OF_THRUSTER = (
 
 
 def read_sdf(path: str | Path) -> tuple[SubmergedBody, list[str]]:
-    r"""The vehicle of the first model with a hydrodynamics system in an SDF file, and what of the model it lacks.
+    r"""The vehicle of the first model with a hydrodynamics system in the SDF file `path`, and what it lacks of it.
 
     Coefficients are those of the plugin in axes with z down. Its Coriolis forces of added mass, which in Gazebo
     Harmonic have other signs than Fossen's (`terms.CORIOLIS`), are derivatives tied to added mass. All links move as

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...effects import EQUATIONS, GRAVITY, coriolis
+from ...effects import EQUATIONS, GRAVITY
+from ...effects.hull import coriolis
 from ..actuators.thruster import Thruster
 from ..inertia import CENTRE_OF_GRAVITY, RIGID, twin
 from ..submerged_body import SubmergedBody

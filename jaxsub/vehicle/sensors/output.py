@@ -82,7 +82,10 @@ class Output:
 
 
 def quantities_of(outputs: Sequence[Output], body: bool) -> dict[str, str]:
-    """What each output shows whose name does not say it, as `Facts.quantities` has it; `body` or mechanism."""
+    """By channel what each of `outputs` shows whose name does not say it, as `Facts.quantities` has it.
+
+    `body` says whether the vehicle is a body, else it is a mechanism.
+    """
     found = {}
     for output in outputs:
         motion, sign, _ = output.framed

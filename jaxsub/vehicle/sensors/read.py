@@ -4,7 +4,8 @@ import dataclasses
 import math
 from typing import Any
 
-from ...effects import CHANNEL_UNITS, INPUT_UNITS
+from ...effects import CHANNEL_UNITS
+from ...effects.derivatives import INPUT_UNITS
 from ...errors import InputError
 from ...parameters import Parameter
 from ...units import same_dimension

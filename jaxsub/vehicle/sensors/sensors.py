@@ -123,7 +123,7 @@ class Sensors(eqx.Module):
 
 
 def recorded_columns(outputs: tuple[Output, ...], shown: Float[np.ndarray, "k c"]) -> dict[str, np.ndarray]:
-    """What outputs show by column of a log, headings within the turn in which their column is written."""
+    """`shown` (K, c), SI, of `outputs`, by column of a log; headings within the turn in which their column is."""
 
     def written(output: Output, values: np.ndarray) -> np.ndarray:
         if not output.wrap:
