@@ -30,7 +30,7 @@ class FinLimits(eqx.Module):
 
     @classmethod
     def of(cls, amplitude: float = AMPLITUDE, rate: float = RATE) -> "FinLimits":
-        """Limits in rad and rad/s. **Raises** `InputError` where one is not positive."""
+        """Limits `amplitude` in rad and `rate` in rad/s. **Raises** `InputError` where one is not positive."""
         for name, value in (("amplitude", amplitude), ("rate", rate)):
             if not value > 0.0:
                 raise InputError(f"fin limits: {name}", f"{value:g} is not positive", "inf stands for no limit")

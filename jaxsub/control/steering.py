@@ -33,7 +33,7 @@ class CourseRate(eqx.Module):
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, limits: FinLimits) -> "CourseRate":
-        """Poles at three quarters of the hull's fastest in sway and yaw.
+        """Poles at three quarters of the fastest of `vehicle` in sway and yaw; deflections keep `limits`.
 
         Full rudder can only just hold an unstable hull at its steady rate, so one is steered for half of that at most.
 
@@ -46,7 +46,7 @@ class CourseRate(eqx.Module):
         return cls(rate_loop(yaw, _PART * yaw.swiftness, authority), number(float(fastest)))
 
     def error(self, shown: Mapping[str, Array], reference: Mapping[str, Array]) -> Float[Array, ""]:
-        """What is wanted of the yaw rate, rad/s."""
+        """The yaw rate of the `reference` less that `shown`, rad/s; both by name, SI."""
         return jnp.clip(reference["course_rate"], -self.fastest, self.fastest) - shown["r"]
 
 
@@ -72,9 +72,10 @@ class Depth(eqx.Module):
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, limits: FinLimits, pitch_limit: float) -> "Depth":
-        """Pitch poles at three quarters of the hull's fastest in heave and pitch, λ = 2μ a seventh of the mean there.
+        """Pitch poles at three quarters of the fastest of `vehicle` in heave and pitch, λ = 2μ a seventh of their mean.
 
-        **Raises** `InputError` for a vehicle without elevators or stern plane that pitch it, or without a depth.
+        Deflections keep `limits`, and the commanded pitch `pitch_limit`, rad. **Raises** `InputError` for a vehicle
+        without elevators or stern plane that pitch it, or without a depth.
         """
         fins = _require(vehicle, "pitch", (PAIR, ("elevator",), ("stern_plane",)))
         if not {"z", "theta"} <= set(vehicle.layout.positions):
@@ -92,8 +93,11 @@ class Depth(eqx.Module):
         reference: Mapping[str, Array],
         descent: Array,
     ) -> tuple[Array, Array, Array]:
-        """What is wanted of the pitch (rad), what the integral of depth learns from (m) given the rate of `descent`
-        (m/s), and what of the commanded pitch is not acted on (rad)."""
+        """Error of the pitch (rad), of the depth that its integral learns from (m), and pitch not acted on (rad).
+
+        `shown` are measured channels and `reference` the wanted ones, by name, SI; `held` is the integral of depth and
+        `descent` the rate of it, m/s.
+        """
         below = reference["depth"] - depth_of(shown)
         wanted = self.outer.demand(below, held)
         error = jnp.clip(wanted, -self.steepest, self.steepest) - shown["theta"]
@@ -113,9 +117,9 @@ class Roll(eqx.Module):
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, limits: FinLimits) -> "Roll":
-        """Poles half as fast as the hull's in roll: noise must not keep the elevators busy.
+        """Poles half as fast as those of `vehicle` in roll: noise must not keep the elevators busy.
 
-        **Raises** `InputError` for a vehicle without two elevators that roll it.
+        Deflections keep `limits`. **Raises** `InputError` for a vehicle without two elevators that roll it.
         """
         _require(vehicle, "roll", (PAIR,))
         roll = axis(vehicle, ("roll",), "phi", {PAIR[0]: 1.0, PAIR[1]: -1.0}, "K_delta_er")

@@ -61,11 +61,14 @@ class AbstractEffect(eqx.Module):
     @classmethod
     @abc.abstractmethod
     def candidates(cls, facts: Facts) -> "Sequence[Self]":
-        """The forms of this effect that make sense on a vehicle, amplitudes zero and shapes on a grid."""
+        """Forms of this effect that make sense on the vehicle of `facts`, amplitudes zero and shapes on a grid."""
 
     @classmethod
     def looked_at(cls, facts: Facts) -> int:
-        """How many forms there were, where `candidates` are the most promising of more; zero where they are all."""
+        """How many forms there were for the vehicle of `facts`, where `candidates` are the most promising of more.
+
+        Zero where they are all.
+        """
         return 0
 
     @property
@@ -170,7 +173,10 @@ class AbstractActuator(AbstractEffect):
 
     @abc.abstractmethod
     def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
-        """What the actuator does at the start, middle and end of each sample interval, given the command there."""
+        """The actuator's deflections at the start, middle and end of each sample interval, given the commands there.
+
+        `times` (K,) are the samples, s; `nodes` (K-1, 3) the commands, SI.
+        """
 
     def remembered(self, interval: float) -> int:
         """How many numbers it carries from one sample to the next, `interval` s apart; each starts at the command."""
@@ -179,9 +185,10 @@ class AbstractActuator(AbstractEffect):
     def advance(
         self, memory: Float[Array, " m"], nodes: Float[Array, "3"], interval: Float[Array, ""]
     ) -> tuple[Float[Array, " m"], Float[Array, "3"]]:
-        """What `respond` says of one interval given what it remembers, and what it remembers after it.
+        """The deflections of `respond` over one interval given its `memory`, and the memory after it.
 
-        **Raises** `InputError` where an effect does not say.
+        `nodes` (3,) are the commands at the start, middle and end of the `interval` of so many s. **Raises**
+        `InputError` where an effect does not say.
         """
         remedy = "let its class derive from AbstractCurve if it has no memory, else define remembered and advance"
         raise InputError(self.label, "does not say how it goes on from one sample to the next", remedy)
@@ -197,7 +204,7 @@ class AbstractCurve(AbstractActuator):
 
     @abc.abstractmethod
     def bend(self, command: Float[Array, " *k"]) -> Float[Array, " *k"]:
-        """The deflection."""
+        """The deflection for a `command`, both SI."""
 
     def respond(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3"]) -> Float[Array, "k1 3"]:
         """The deflections."""
@@ -250,7 +257,7 @@ class AbstractSensor(AbstractInstrument):
     def measure(
         self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
     ) -> Float[Signal, " *k"]:
-        """What `show` says of the channel."""
+        """The channel as recorded at `times` (s), given true `outputs` by channel and the `motion`, SI."""
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -47,7 +47,7 @@ class _Suction(AbstractForce):
 
     @abc.abstractmethod
     def distance(self, motion: Motion) -> Signal:
-        """How far the boundary is, m."""
+        """Distance of the boundary in `motion`, m."""
 
 
 def _feels(facts: Facts) -> bool:

@@ -85,7 +85,7 @@ class Derivative:
 
     @classmethod
     def by(cls, equation: str, *variables: str) -> "Derivative":
-        """The derivative by a product of `variables`; of two equal ones only as their square."""
+        """The derivative of an `equation` by a product of `variables`; of two equal ones only as their square."""
         return cls(equation, _gathered([(variable, False) for variable in variables]))
 
     @property

@@ -56,7 +56,7 @@ class _ExtraBuoyancy(AbstractForce):
 
     @abc.abstractmethod
     def newton(self, motion: Motion) -> Signal:
-        """Extra buoyancy, N."""
+        """Extra buoyancy in `motion`, N."""
 
 
 class TrimOffset(AbstractForce):

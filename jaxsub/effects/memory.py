@@ -30,7 +30,7 @@ class AbstractMemory(AbstractForce):
 
     @abc.abstractmethod
     def memory_rates(self, motion: Motion) -> dict[str, Signal]:
-        """Rate of each state, per s."""
+        """Rate of each state along `motion`, per s."""
 
 
 class FluidMemory(AbstractMemory):

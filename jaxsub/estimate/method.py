@@ -87,10 +87,10 @@ class AbstractMethod(eqx.Module):
         outputs: Float[Array, "n r k c"] | None = None,
         passes: Passes | None = None,
     ) -> Found:
-        """Estimate from each of the `starts`; `outputs`, if given, are recordings of their own for each.
+        """Estimate from each of the `starts` (n, d), coordinates of `problem`.
 
-        A method that takes long runs block by block tells `passes` how many passes over all samples it has made, and
-        how many it expects to make.
+        `outputs` (n, R, K, c), SI, if given, are recordings of their own for each. A method that takes long runs block
+        by block calls `passes` with the passes over all samples that it has made, and those that it expects to make.
         """
 
 

@@ -67,10 +67,11 @@ class Problem(eqx.Module):
         moving: bool | Bool[Array, " p"] = True,
         known_start: bool = False,
     ) -> "Problem":
-        """The problem of fitting `vehicle` to `runs`; the search starts from the initial states `start`, if given.
+        """The problem of fitting `vehicle` to `runs`.
 
-        `moving` says which parameters may move: false frees the initial states alone. It is data and not structure, so
-        one compiled search serves every choice. `known_start` takes `start` for the truth.
+        The search starts from the initial states `start` (R, s), SI, if given; `sigma` (c,) is the noise of the
+        channels, SI. `moving` says which parameters may move: false frees the initial states alone. It is data and not
+        structure, so one compiled search serves every choice. `known_start` takes `start` for the truth.
         """
         rows = vehicle.layout.free
         values = vehicle.values()
@@ -157,11 +158,11 @@ class Problem(eqx.Module):
         return jnp.concatenate([theta, y[p:] + step[p:]]), jnp.concatenate([part, step[p:]])
 
     def residuals(self, y: Float[Array, " d"]) -> Float[Array, " m"]:
-        """Whitened errors of the outputs, then of the priors."""
+        """Whitened errors of the outputs at the coordinates `y` (d,), then of the priors."""
         return jnp.concatenate([_outputs(self, y, jnp.zeros(len(self.spread))).ravel(), _prior(self, y)])
 
     def cost(self, y: Float[Array, " d"]) -> Float[Array, ""]:
-        r"""$\tfrac12\sum$ residuals²: minus the log-likelihood, up to its constant."""
+        r"""$\tfrac12\sum$ residuals² at the coordinates `y` (d,): minus the log-likelihood, up to its constant."""
         if self.march is None:
             return 0.5 * jnp.sum(self.residuals(y) ** 2)
         start = self.guess + self.spread * self.moved(y)
@@ -174,7 +175,7 @@ class Problem(eqx.Module):
         return self.expansion(y, self.products(y))
 
     def expansion(self, y: Float[Array, " d"], gram: Float[Array, "r q q"]) -> "Expansion":
-        """`expand` by the `products` at `y`."""
+        """`expand` by `gram` (R, q, q), the `products` at `y`."""
         p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
         prior, slopes = value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
         among = jnp.sum(gram[:, :p, :p], axis=0) + slopes.T @ slopes
@@ -185,7 +186,7 @@ class Problem(eqx.Module):
         return Expansion(cost, jnp.concatenate([by_theta, by_start]), curvature)
 
     def products(self, y: Float[Array, " d"]) -> Float[Array, "r q q"]:
-        """Products of each run's whitened columns: by the parameters, by its own initial state, and the error.
+        """Products of each run's whitened columns at `y` (d,): by the parameters, its own initial state, and the error.
 
         Runs do not feel each other's initial states, so one tangent a state serves every run: p + s simulations instead
         of p + R s.
@@ -205,7 +206,10 @@ class Problem(eqx.Module):
 
     @quietly
     def products_in_blocks(self, y: Float[Array, " d"], watch: Watch = nobody) -> Float[Array, "r q q"]:
-        """`products`, summed over blocks of samples. Not to be called in `jit`."""
+        """`products` at `y` (d,), summed over blocks of samples. Not to be called in `jit`.
+
+        `watch` is called with the share of the samples that is done.
+        """
         vehicle, start, scale = _split(self, y)
         # by NumPy, for which no program has to be made
         scale = np.asarray(scale)

@@ -99,23 +99,29 @@ class AbstractFilter(eqx.Module):
 
     @abc.abstractmethod
     def predict(self, state: FilterState, sample: Sample, G: Float[Array, "s m"]) -> FilterState:
-        """Across the interval before `sample`, with process noise of covariance G Gᵀ."""
+        """`state` across the interval before `sample`, with process noise of covariance G Gᵀ."""
 
     @abc.abstractmethod
     def widened(self, state: FilterState, G: Float[Array, "s m"]) -> FilterState:
-        """With process noise of covariance G Gᵀ added where it stands."""
+        """`state` with process noise of covariance G Gᵀ added, at the same time."""
 
     @abc.abstractmethod
     def correct(self, state: FilterState, seen: Innovation) -> tuple[FilterState, Float[Array, "c c"]]:
-        """By what was measured, and the factor of the innovation's covariance."""
+        """`state` corrected by the innovation `seen`, and the factor of the innovation's covariance."""
 
     def start(self, x: Float[Array, " n"], theta: Float[Array, " p"], theta_root: Float[Array, "p p"]) -> FilterState:
-        """Before the first sample; `theta_root` is a square root of the parameters' covariance."""
+        """The filter's state before the first sample, of the state `x` (n,) and the parameters `theta` (p,), SI.
+
+        `theta_root` (p, p) is a square root of the parameters' covariance.
+        """
         joint = self.form.start(block_diag(self.x_root, theta_root))
         return self._begun(x, theta, joint, jnp.zeros((), bool))
 
     def restart(self, state: FilterState, x: Float[Array, " n"]) -> FilterState:
-        """Before the first sample of another run: the state starts anew, the parameters and their covariance stay."""
+        """Before the first sample of another run: the `state` starts at `x` (n,), SI.
+
+        The parameters and their covariance stay.
+        """
         return self._begun(x, state.theta, self.form.restart(self.x_root, state.joint), state.diverged)
 
     def _begun(
@@ -152,7 +158,10 @@ class AbstractFilter(eqx.Module):
     def corrected(
         self, state: FilterState, before: FilterState, seen: Innovation, G: Float[Array, "s m"]
     ) -> tuple[FilterState, Estimate]:
-        """The next state and what is known, of the `state` before a sample and what `before` made of both."""
+        """The next state and the estimate, of the `state` before a sample and its prediction `before` for that sample.
+
+        `seen` is the innovation, and G Gᵀ with `G` (s, m) the covariance of the process noise.
+        """
         after, factor = self.correct(before, seen)
         finite = jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(after)])
         sound = jnp.all(finite) & ~state.diverged

@@ -25,25 +25,29 @@ class AbstractForm(eqx.Module):
 
     @abc.abstractmethod
     def factor(self, kept: Float[Array, "n n"]) -> Float[Array, "n n"]:
-        """The lower-triangular root of P."""
+        """The lower-triangular root of the covariance P that `kept` (n, n) stands for."""
 
     @abc.abstractmethod
     def deviations(self, kept: Float[Array, "n n"]) -> Float[Array, " n"]:
-        """Standard deviations."""
+        """Standard deviations (n,) of the covariance that `kept` (n, n) stands for."""
 
     @abc.abstractmethod
     def predict(self, kept: Float[Array, "n n"], F: Float[Array, "n n"], G: Float[Array, "n m"]) -> Float[Array, "n n"]:
-        """After a step of Jacobian F with process noise of covariance G Gᵀ."""
+        """`kept` (n, n) after a step of Jacobian F with process noise of covariance G Gᵀ."""
 
     @abc.abstractmethod
     def update(
         self, kept: Float[Array, "n n"], C: Float[Array, "c n"], R_root: Float[Array, "c c"], mask: Bool[Array, " c"]
     ) -> tuple[Float[Array, "n c"], Float[Array, "c c"], Float[Array, "n n"]]:
-        """Gain, lower-triangular factor of the innovation's covariance, and what is kept after the measurement."""
+        """Gain, lower-triangular factor of the innovation's covariance, and `kept` (n, n) after a measurement.
+
+        `C` (c, n) is its Jacobian, `R_root` (c, c) a root of its noise, and `mask` (c,) says which channels were
+        measured.
+        """
 
     @abc.abstractmethod
     def seen(self, kept: Float[Array, "n n"], C: Float[Array, "c n"]) -> Float[Array, "c c"]:
-        """C P Cᵀ."""
+        """C P Cᵀ with P the covariance that `kept` (n, n) stands for."""
 
     @abc.abstractmethod
     def restart(self, root: Float[Array, "n n"], kept: Float[Array, "q q"]) -> Float[Array, "q q"]:

@@ -57,9 +57,10 @@ class InnovationGate(AbstractGate):
     def of(
         cls, channels: int, false_rejection: float = 1e-6, patience: int = 5, dtype: DTypeLike | None = None
     ) -> "InnovationGate":
-        """The gate that rejects a measurement of a consistent filter with probability `false_rejection`.
+        """The gate of so many `channels` that rejects a measurement of a consistent filter with `false_rejection`.
 
-        By default 4.9 standard deviations: at ten measurements a second, one in a day of each channel.
+        That probability is by default that of 4.9 standard deviations: at ten measurements a second, one in a day of
+        each channel. `patience` is as the field, and `dtype` that of the filter's numbers, by default JAX's own.
         """
         width = NormalDist().inv_cdf(1.0 - 0.5 * false_rejection) if false_rejection > 0.0 else math.inf
         return cls(widths=jnp.full(channels, width, dtype), patience=patience)

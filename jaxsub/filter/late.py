@@ -61,7 +61,10 @@ class DelayedFilter(eqx.Module):
         return Past(before, samples, jnp.full(self.depth, jnp.inf, like.elapsed.dtype), state)
 
     def step(self, past: Past, sample: Sample, late: Late) -> tuple[Past, Estimate]:
-        """After `sample`, and with `late` taken at its time if its mask says that there is one."""
+        """The estimate after `sample` and all before it, `past`.
+
+        `late` is taken at its time if its mask says that there is one.
+        """
         push = lambda old, new: jnp.concatenate([old[1:], jnp.asarray(new)[None]])
         before = jax.tree.map(push, past.before, past.now)
         samples = jax.tree.map(push, past.samples, sample)

@@ -36,11 +36,11 @@ class AbstractProcess(eqx.Module):
 
     @abc.abstractmethod
     def step(self, x: Float[Array, " n"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " n"]:
-        """The state at `sample`, given the state at the sample before."""
+        """The state at `sample`, given the state `x` (n,) at the sample before and the parameters `theta` (p,)."""
 
     @abc.abstractmethod
     def observe(self, x: Float[Array, " n"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " c"]:
-        """What the sensors show."""
+        """The channels (c,) of `sample` at the state `x` (n,) with the parameters `theta` (p,), SI."""
 
     def moved(self, x: Float[Array, " n"], change: Float[Array, " s"]) -> Float[Array, " n"]:
         """The state that lies `change` from `x`."""
@@ -55,7 +55,7 @@ class AbstractProcess(eqx.Module):
     ) -> Float[Array, "s k"]:
         """A root of all that drives the state in the step from `x`: the rule's `root`, and what a process adds to it.
 
-        A process that takes measured inputs adds their noise here.
+        `theta` (p,) are the parameters. A process that takes measured inputs of `sample` adds their noise here.
         """
         return root
 

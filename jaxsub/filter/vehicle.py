@@ -57,7 +57,7 @@ class VehicleProcess(AbstractProcess):
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, substeps: int = 1) -> "VehicleProcess":
-        """`vehicle`, with coordinates about its free parameters."""
+        """`vehicle`, with coordinates about its free parameters, by so many `substeps` in a sample interval."""
         values = vehicle.values()
         theta = np.array([float(values[row.name]) for row in vehicle.layout.free])
         return cls(vehicle, Transform.of(vehicle.layout.free, theta), substeps)

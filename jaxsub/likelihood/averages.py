@@ -41,7 +41,7 @@ class Averages(eqx.Module):
 
     @classmethod
     def joined(cls, parts: Iterable[tuple[System, Float[Values, "r j1 c q"]]], samples: int) -> "Averages":
-        """The `group_means` of consecutive blocks, which have so many `samples` of all runs."""
+        """The `group_means` of consecutive blocks, `parts`, which have so many `samples` of all runs."""
         systems, shown = zip(*jax.device_get(list(parts)), strict=True)
         along = lambda arrays: np.concatenate(arrays, axis=1)
         # the end of a block is where the next begins

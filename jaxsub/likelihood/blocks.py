@@ -72,7 +72,11 @@ class BlockLinearised(eqx.Module):
         spread: Float[Array, " s"],
         watch: Watch = nobody,
     ) -> "BlockLinearised":
-        """`vehicle` linearised along its trajectory from the initial states `start`."""
+        """`vehicle` linearised along its trajectory over `runs` from the initial states `start` (R, s), SI.
+
+        `sigma` (c,) is the noise of the channels and `spread` (s,) the prior standard deviation of the initial states,
+        SI. `watch` is called with the share of the samples that is done.
+        """
         length, begins, errors, summed, only = block_length(vehicle, runs), [], [], [], None
         for at, model, products in _passed(vehicle, runs, start, sigma, spread, watch):
             begins.append(at)

@@ -66,7 +66,10 @@ class System(eqx.Module):
     def of(
         cls, model: Linearised | Jacobians, runs: Runs, sigma: Float[Array, " c"], spread: Float[Array, " s"]
     ) -> "System":
-        """A linearised model on `runs`, its channels in units of `sigma`."""
+        """A linearised `model` on `runs`, its channels in units of `sigma` (c,), SI.
+
+        `spread` (s,) is the prior standard deviation of the initial states, SI.
+        """
         C = model.C * (runs.mask / sigma)[..., None]
         intervals = jnp.where(runs.live, runs.steps[runs.step_of], 0.0)
         return cls(model.A, model.G, C, runs.mask, intervals, spread)

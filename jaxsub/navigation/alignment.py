@@ -57,7 +57,10 @@ class Alignment(eqx.Module):
     field: Float[Array, "3"]
 
     def deviations(self, tilt: float, heading: float) -> Float[Array, "3"]:
-        """Standard deviations of the attitude's error about north, east, down: those given, π/√3 where unknown."""
+        """Standard deviations (3,), rad, of the attitude's error about north, east, down.
+
+        Those are `tilt` and `heading`, rad, where known, else π/√3.
+        """
         known = jnp.stack([self.level, self.level, self.heading])
         return jnp.where(known, jnp.array([tilt, tilt, heading], self.q.dtype), UNKNOWN)
 

@@ -142,7 +142,7 @@ class Program:
         return self._state.given(state, "state")
 
     def unpack(self, packed: Packed) -> Any:
-        """The state again, of JAX's arrays."""
+        """The state that was `packed` again, of JAX's arrays."""
         return jax.tree.map(jnp.asarray, self._state.unpacked(packed))
 
     def step(self, packed: Packed, reading: Any) -> tuple[Packed, Any]:

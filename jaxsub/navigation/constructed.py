@@ -173,7 +173,10 @@ class ConstructedAttitudeStream(eqx.Module):
 
     @classmethod
     def start(cls, limits: Limits = Limits(), dtype: DTypeLike | None = None) -> "ConstructedAttitudeStream":
-        """Before the first sample; `dtype` of the samples, by default JAX's own."""
+        """Before the first sample; `limits` are as of `constructed_attitude`.
+
+        `dtype` is that of the samples, by default JAX's own.
+        """
         zeros = lambda *shape: jnp.zeros(shape, dtype)
         no, none = jnp.zeros((), bool), jnp.zeros((), jnp.int32)
         return cls(zeros(), zeros(3), no, no, zeros(2, 3), zeros(2), none, zeros(2, 3), zeros(2), limits)

@@ -77,7 +77,10 @@ class PaperNavigator(AbstractStream):
     limits: Limits = eqx.field(static=True, default=Limits())
 
     def start(self, attitude: FilterState, position: FilterState, like: FlightReading) -> NavigatorState:
-        """Before the first reading, from states of the two filters; readings will have the type of `like`."""
+        """Before the first reading, from states of the filters of `attitude` and `position`.
+
+        Readings will have the type of `like`.
+        """
         angles, none = jnp.zeros_like(like.gyro), jnp.zeros(3, bool)
         seen = Reading(like.time, Gyro(like.gyro), angles, none, jnp.ones_like(angles))
         course = Course(like.speed, attitude.x[:4], angles)

@@ -82,7 +82,7 @@ class StrapdownNavigation(AbstractProcess):
         return jnp.concatenate([logarithm(product(x[:4], conjugate(origin[:4]))), x[4:] - origin[4:]])
 
     def gravity(self, dtype: DTypeLike) -> Float[Array, "3"]:
-        """North, east, down, m/s²."""
+        """Gravity (3,) north, east, down, m/s², of type `dtype`."""
         return jnp.array([0.0, 0.0, GRAVITY], dtype)
 
     def step(self, x: Float[Array, "16"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, "16"]:

@@ -69,7 +69,7 @@ class Faults(eqx.Module):
 
     @classmethod
     def none(cls, channels: int) -> "Faults":
-        """Nothing was wrong yet."""
+        """Nothing was wrong yet, on so many `channels`."""
         zero, each = jnp.zeros((), jnp.int32), jnp.zeros(channels, jnp.int32)
         return cls(zero, zero, zero, zero, zero, zero, zero, each, each, each, each, zero)
 
@@ -171,7 +171,7 @@ class Stream(AbstractStream):
         return eqx.tree_at(lambda filter: filter.gate, self.filter, gate)
 
     def start(self, state: FilterState, like: Reading) -> StreamState:
-        """Before the first reading; readings will have the shapes of `like`, which may be the first itself.
+        """Before the first reading, from `state`; readings will have the shapes of `like`, which may be the first.
 
         Its inputs are held until finite ones come; those that are not finite count as zero.
         """

@@ -44,10 +44,11 @@ class Sampled(eqx.Module):
         index: Array,
         push: Float[Array, "2 n"] | None = None,
     ) -> Float[Array, " s"]:
-        """The state one sample later.
+        """The `state` (s,), SI, one sample later.
 
-        `index` says which step length; `push` is an extra generalised force (N, N m) at the start and end of the
-        interval, linear between: the port through which a diagnosis asks what a missing force would do.
+        `nodes` (3, m) are the inputs at the start, middle and end of the interval, SI. `index` says which step length;
+        `push` (2, n) is an extra generalised force (N, N m) at the start and end of the interval, linear between: the
+        port through which a diagnosis asks what a missing force would do.
         """
         n = self.inverse.shape[0]
         extra = None if push is None else jnp.stack([push[0], 0.5 * (push[0] + push[1]), push[1]])

@@ -34,7 +34,7 @@ class Trajectory(eqx.Module):
 
     @classmethod
     def of(cls, vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered: Array) -> "Trajectory":
-        """Along states (R, K, s) expected and filtered."""
+        """The motion of `vehicle` over `runs` along states (R, K, s) `expected` and `filtered`, SI."""
         found = _trajectory(vehicle, runs, expected, filtered)
         steps = np.where(runs.live, np.asarray(runs.steps)[np.asarray(runs.step_of)], 0.0)
         return cls(*(jax.tree.map(np.asarray, part) for part in (*found, runs.times, steps)))

@@ -37,11 +37,11 @@ class Manifest:
 
     @classmethod
     def of_file(cls, file: Path) -> "Manifest":
-        """That of a single result."""
+        """The manifest of the single result `file`."""
         return cls(file.with_name(f".{file.name}{MANIFEST}"))
 
     def begin(self, command: str) -> None:
-        """Write the first line, unless there is one."""
+        """Write the first line, which names the `command`, unless there is one."""
         with locked(self.path.parent):
             if self._lines():
                 return

@@ -140,7 +140,7 @@ class Plan:
         return [Chunk(case, first, min(first + width, self.per_case)) for case, first, width in ranges]
 
     def chunk_width(self, problem: Problem) -> int:
-        """Searches in a chunk: the shares that an estimator's memory is bounded by, more of them in large sweeps."""
+        """Searches in a chunk of `problem`: the shares that bound an estimator's memory, more in large sweeps."""
         share = share_for(problem)
         return share * -(-self.per_case * len(self.cases) // (share * _FILES))
 
@@ -150,7 +150,10 @@ class Plan:
         return scattered_by_number(self.problems[case], self.spread, jnp.asarray(numbers % self.starts), key)
 
     def outputs(self, case: int, numbers: np.ndarray) -> Float[Array, "n r k c"] | None:
-        """The recordings that they are given, SI; None where all have those of the problem."""
+        """Recorded outputs (n, R, K, c), SI, of the searches `numbers` of `case`.
+
+        None where all have those of the problem.
+        """
         if not self.noise:
             return None
         problem, recorded = self.problems[case], case % len(self.recordings)

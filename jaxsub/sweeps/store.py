@@ -64,7 +64,10 @@ class Store:
         self.keep(self._path(chunk), bytes(dataset.to_netcdf(engine=_ENGINE)))
 
     def keep(self, path: Path, content: bytes) -> None:
-        """Write a file of the sweep and list it in the manifest. Raises `OutputError` where it cannot be written."""
+        """Write `content` to the file `path` of the sweep and list it in the manifest.
+
+        Raises `OutputError` where it cannot be written.
+        """
         manifest = Manifest.of_folder(self.folder)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -65,15 +65,15 @@ class AbstractVehicle(eqx.Module):
 
     @abc.abstractmethod
     def with_own_values(self, values: Mapping[str, Values]) -> Self:
-        """The same vehicle with other numbers for those named."""
+        """The same vehicle with other numbers, the `values` (SI) by name."""
 
     @abc.abstractmethod
     def motion(self, state: Float[Array, "*k s"], signals: Float[Array, "*k m"]) -> Motion:
-        """The motion by name."""
+        """The motion by name of `state` (*k, s) under `signals` (*k, m), SI."""
 
     @abc.abstractmethod
     def own_force(self, motion: Motion) -> dict[str, Signal]:
-        """Generalised forces (N, N m) other than linear damping of the free equations and effects."""
+        """Generalised forces (N, N m) of `motion` but linear damping of the free equations and effects."""
 
     @property
     def has(self) -> frozenset[str]:
@@ -107,7 +107,7 @@ class AbstractVehicle(eqx.Module):
 
     @abc.abstractmethod
     def own_position_rates(self, motion: Motion) -> dict[str, Signal]:
-        """Rates of the position states, without its effects'."""
+        """Rates (SI) of the position states in `motion`, without its effects'."""
 
     @abc.abstractmethod
     def channels(self, motion: Motion) -> dict[str, Signal]:
@@ -121,7 +121,7 @@ class AbstractVehicle(eqx.Module):
         return named
 
     def with_values(self, values: Mapping[str, Values]) -> Self:
-        """The same vehicle with other numbers for those named, and for those that follow from them."""
+        """The same vehicle with other numbers, `values` (SI) by name, and those that follow from them."""
         if self.layout.ties:
             every, names = {**self.values(), **values}, self.aliases
             every |= {alias: every[name] for alias, name in names.items()}
@@ -155,7 +155,7 @@ class AbstractVehicle(eqx.Module):
         return dataclasses.replace(self, effects=kept, layout=layout, spreads=spreads)
 
     def with_spreads(self, spreads: Mapping[str, ArrayLike]) -> Self:
-        """The same vehicle with other standard deviations between runs of the numbers named, SI."""
+        """The same vehicle with other standard deviations between runs: `spreads` by name, SI."""
         return dataclasses.replace(self, spreads={n: number(spreads.get(n, old)) for n, old in self.spreads.items()})
 
     def of_run(self, positions: Mapping[str, Signal]) -> Self:
@@ -180,7 +180,7 @@ class AbstractVehicle(eqx.Module):
         return dataclasses.replace(self, layout=layout)
 
     def position_rates(self, motion: Motion) -> dict[str, Signal]:
-        """Rates of the position states, effects included."""
+        """Rates (SI) of the position states in `motion`, effects included."""
         rates = self.own_position_rates(motion)
         for effect in self.effects:
             if isinstance(effect, AbstractMemory):
@@ -218,7 +218,10 @@ class AbstractVehicle(eqx.Module):
         return stack(total, self.layout.equations, motion.rates[self.layout.equations[0]])
 
     def actuate(self, times: Float[Array, " k"], nodes: Float[Array, "k1 3 m"]) -> Float[Array, "k1 3 m"]:
-        """The signals at the start, middle and end of each interval, after the actuators."""
+        """The signals at the start, middle and end of each interval, after the actuators.
+
+        `times` (K,) are the samples, s, and `nodes` (K-1, 3, m) the commands, SI.
+        """
         names = [name for name, _ in self.layout.inputs]
         nodes = self.true_inputs(nodes)
         for effect in self.effects:
@@ -255,7 +258,10 @@ class AbstractVehicle(eqx.Module):
     def truth(
         self, times: Float[Array, " *k"], state: Float[Array, "*k s"], signals: Float[Array, "*k m"]
     ) -> tuple[dict[str, Signal], Motion]:
-        """What the sensors show before any effect on them, by output, and the motion that they see."""
+        """Outputs before any effect of a sensor, by output, and the motion that the sensors see, SI.
+
+        `times` (*k,) are s, `state` (*k, s) and `signals` (*k, m) SI.
+        """
         columns = len(self.layout.held) + len(self.layout.interpolated)
         timed = jnp.concatenate([self.true_inputs(signals)[..., :columns], times[..., None]], axis=-1)
         motion = self.motion(state, timed)

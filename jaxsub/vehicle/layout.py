@@ -116,7 +116,7 @@ class Layout:
         return dataclasses.replace(self, parameters=rows, positions=positions)
 
     def unit(self, name: str) -> str:
-        """The SI unit of an output, or of a body's channel or state.
+        """The SI unit of `name`: an output, or a body's channel or state.
 
         Nothing for a mechanism's that states none: its `q` may be in metres or volts.
         """
@@ -126,7 +126,7 @@ class Layout:
         return output.unit or (channel_unit(output.channel) if self.kind == "submerged-body" else "")
 
     def input_unit(self, name: str) -> str:
-        """The SI unit of an input; nothing where the vehicle file does not say."""
+        """The SI unit of the input `name`; nothing where the vehicle file does not say."""
         known = INPUT_UNITS if self.kind == "submerged-body" else {}
         return known.get(name) or dict(self.input_units).get(name, "")
 

@@ -48,12 +48,12 @@ class InitialFile:
     unused: list[str] = dataclasses.field(default_factory=list)
 
     def put(self, section: str, key: str, value: str | float, comment: str = "") -> None:
-        """A key of a section; `value` is a number or TOML."""
+        """The `key` of a `section`; `value` is a number or TOML, and `comment` stands behind it."""
         toml = value if isinstance(value, str) else number(value)
         self.tables.setdefault(section, {})[key] = toml, comment
 
     def add(self, estimate: Estimate, *names: str) -> None:
-        """A coefficient, or several that are alike, on top of what each has so far; the errors are independent."""
+        """Add the `estimate` of coefficients `names`, alike, to what each has so far; the errors are independent."""
         for name in names:
             before = self.coefficients.get(name, Estimate(0.0, 0.0))
             source = "; ".join(filter(None, (before.source, estimate.source if name == names[0] else f"as {names[0]}")))

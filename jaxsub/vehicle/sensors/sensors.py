@@ -38,11 +38,11 @@ class Sensors(eqx.Module):
     density: float | None = eqx.field(static=True, default=None)
 
     def with_values(self, values: Mapping[str, Values]) -> Self:
-        """The same sensors with other numbers for those named."""
+        """The same sensors with other numbers, the `values` (SI) by name."""
         return dataclasses.replace(self, numbers={n: number(values.get(n, old)) for n, old in self.numbers.items()})
 
     def show(self, output: Output, channels: Mapping[str, Signal], motion: Motion) -> Signal:
-        """What one sensor shows, given the `channels` at the origin of the body's axes."""
+        """The sensor's signal by `output` in `motion`, given the `channels` at the origin of the body's axes, SI."""
         channel, sign, constant = output.framed
         shown = self._at_sensor(output, channel, channels, motion)
         if output.frame:
@@ -60,13 +60,16 @@ class Sensors(eqx.Module):
         return any(part is not None for part in self._line(name))
 
     def true(self, name: str, recorded: Signal) -> Signal:
-        """A column as the signal that it shows: the inverse of `recorded`."""
+        """The column `name` as the signal that it shows: the inverse of `recorded`."""
         scale, offset = self._line(name)
         recorded = recorded if offset is None else recorded - offset
         return recorded if scale is None else recorded / scale
 
     def channel_of(self, output: Output, recorded: Values) -> Values:
-        """A recorded column in the form of the state that it shows (`Output.state`); arms and mountings stay in it."""
+        """A `recorded` column in the form of the state that `output` shows (`Output.state`).
+
+        Arms and mountings stay in it.
+        """
         _, sign, constant = output.framed
         value = sign * (self.true(output.name, recorded) - constant)
         if output.channel == "pressure":
