@@ -64,7 +64,7 @@ def runs(process: AbstractProcess, rule: Callable[[Array], AbstractNoiseRule], s
         whitened = jax.vmap(lambda L, v: solve_triangular(L, v, lower=True))(found.factor, found.innovation)
         nis = jnp.where(jnp.all(found.used, axis=1), jnp.sum(whitened**2, axis=1), jnp.nan)
         truth = jnp.concatenate([jax.vmap(from_euler)(run.angles), run.bias], axis=1)
-        errors = jax.vmap(process.apart)(found.x, truth)
+        errors = jax.vmap(process.difference)(found.x, truth)
         measured, known = run.measured.angles[:, 1], run.measured.known[:, 1]
         beside = (errors, found.x_std, found.noise_std, jnp.any(found.diverged))
         return Runs._make((pitch_of(found), measured, known, nis, *beside))
