@@ -19,3 +19,14 @@ class RESULTS(optx.RESULTS):  # pyright: ignore[reportGeneralTypeIssues]
 SUCCESSFUL = cast(RESULTS, RESULTS.successful)
 NONFINITE = cast(RESULTS, RESULTS.nonfinite)
 UNFINISHED = cast(RESULTS, RESULTS.nonlinear_max_steps_reached)
+# what became of a search, as files have it: a number for each, which later versions may add to and not change
+OUTCOMES = (
+    "successful",
+    "nonlinear_max_steps_reached",
+    "nonlinear_divergence",
+    "nonfinite",
+    "nan_start",
+    "not_stationary",
+    "indefinite_inertia",
+    "other",
+)

@@ -12,15 +12,15 @@ from ..discrepancy.diagnosis import Coefficient, Location, Physics, Verdict
 from ..discrepancy.next_run import next_run, said
 from ..discrepancy.procedure import Keep
 from ..discrepancy.progress import Progress
-from ..discrepancy.stored import STORED, save_conclusions
+from ..discrepancy.stored import STORED, load_conclusions, save_conclusions
 from ..effects import AbstractEffect
 from ..errors import InputError
 from ..estimate import require_free
 from ..plain import to_json
-from ..recording import Recording, hold_out, save
+from ..recording import Recording, hold_out, load, save
 from ..recording.recording import Recordings
 from ..report.text import measurement, percent, ratio, unit
-from ..vehicle import AbstractVehicle, vehicle_text, with_coefficients
+from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text, with_coefficients
 from .recordings import checked
 from .result import AbstractResult
 from .table import Parts, Table
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from ..report import Picture
 
-NEXT_RUN = "next_manoeuvre.csv"
+IMPROVED, NEXT_RUN = "improved.toml", "next_manoeuvre.csv"
 
 
 def diagnose(
@@ -97,6 +97,18 @@ class Diagnosis(AbstractResult):
     conclusions: Conclusions
     improved: AbstractVehicle
     next_run: Recording | None = None
+
+    @classmethod
+    def load(cls, folder: str | Path, effects: Sequence[type[AbstractEffect]] = ()) -> "Diagnosis":
+        """The diagnosis in `folder`, written by `save` or a command; `effects` are a user's own that it names.
+
+        Arrays are in single precision, and the models of rivals are not kept: `with_next_run` adds nothing.
+
+        **Raises** `InputError` where there is none, or one of another version.
+        """
+        place = Path(folder)
+        conclusions, planned = load_conclusions(place / STORED), place / NEXT_RUN
+        return cls(conclusions, read_vehicle(place / IMPROVED, effects), load(planned) if planned.exists() else None)
 
     @property
     def verdict(self) -> Verdict:
@@ -235,6 +247,6 @@ class Diagnosis(AbstractResult):
         """Write `diagnosis.json` and `improved.toml` alone into `folder`; returns the latter's text."""
         made = self.conclusions
         text = vehicle_text(with_coefficients(self.improved), f"{made.vehicle}, improved by jaxsub\n{made.summary}")
-        (folder / "improved.toml").write_text(text, encoding="utf-8")
+        (folder / IMPROVED).write_text(text, encoding="utf-8")
         (folder / "diagnosis.json").write_text(to_json(made.to_json()), encoding="utf-8")
         return text

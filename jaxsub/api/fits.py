@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from ..effects import AbstractEffect
 from ..errors import InputError
 from ..estimate import (
     METHODS,
@@ -43,9 +44,11 @@ from ..recording.recording import Recordings
 from ..recording.runs import Runs
 from ..report.text import unit
 from ..results import RESULTS
-from ..vehicle import AbstractVehicle, write_vehicle
+from ..vehicle import AbstractVehicle
 from .recordings import checked
 from .result import AbstractResult
+from .stored import findings_of
+from .stored_solutions import store_solution, stored_solution
 from .table import Parts, Table
 
 if TYPE_CHECKING:
@@ -143,6 +146,16 @@ class Fit(AbstractResult):
     coloured: Coloured | None = None
     recordings: tuple[Recording, ...] = ()
     findings: tuple[Finding, ...] = ()
+
+    @classmethod
+    def load(cls, folder: str | Path, effects: Sequence[type[AbstractEffect]] = ()) -> "Fit":
+        """The fit that `save` wrote to `folder`; `effects` are a user's own that the vehicle has.
+
+        **Raises** `InputError` where there is none: the command `identify` keeps no recordings, and nothing to load.
+        """
+        found, kept = stored_solution(Path(folder), effects)
+        own, more = kept.text, {"recordings": kept.recordings, "findings": findings_of(kept.text["findings"])}
+        return cls(found, own["method"], own["where"], assess(found), tuple(own["runs_used"]), **more).identified()
 
     @property
     def vehicle(self) -> AbstractVehicle:
@@ -344,8 +357,13 @@ class Fit(AbstractResult):
         return {"unit": one.unit, "spread": spread, "runs": runs}
 
     def write(self, folder: Path) -> None:
-        """Write `fitted.toml`, `coefficients.csv` and `identification.json` into `folder`."""
-        write_vehicle(self.vehicle, folder / "fitted.toml", f"fitted by jaxsub; {self.assessment.verdict()}")
+        """Write `fitted.toml`, `coefficients.csv` and `identification.json` into `folder`.
+
+        A fit that has its recordings also writes `result.npz`, from which `load` makes it again.
+        """
+        own = {"method": self.method, "where": self.where, "runs_used": self.runs, "findings": self.findings}
+        comment = f"fitted by jaxsub; {self.assessment.verdict()}"
+        store_solution(self.solution, comment, folder, own, self.recordings)
         columns = ("name", "value", "standard_error", "unit", "standard_error_white", "verdict")
         with (folder / "coefficients.csv").open("w", newline="", encoding="utf-8") as file:
             table = csv.writer(file)

@@ -1,12 +1,15 @@
 """Simulations: a vehicle's answer to the inputs of recordings, and how far it is from what was measured."""
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..effects import AbstractEffect
 from ..errors import InputError
 from ..estimate import Assessment, assess_residuals, batch, channel_rms
 from ..findings import Finding
@@ -16,10 +19,11 @@ from ..recording.recording import Recordings, listed
 from ..recording.runs import Runs
 from ..report.text import unit
 from ..simulation import simulate as sampled
-from ..vehicle import AbstractVehicle, recorded_columns
+from ..vehicle import AbstractVehicle, read_vehicle, recorded_columns, write_vehicle
 from .initial_states import Start, initial_state, with_every_channel
 from .recordings import checked
 from .result import AbstractResult
+from .stored import findings_of, store, stored
 from .table import Parts, Table
 
 if TYPE_CHECKING:
@@ -28,6 +32,7 @@ if TYPE_CHECKING:
 
     from ..report import Picture
 
+VEHICLE = "vehicle.toml"
 _SAID: dict[Start, str] = {
     "rest": "The model starts at rest",
     "recorded": "The model starts from the first samples, and at rest where nothing is measured",
@@ -180,6 +185,22 @@ class Simulation(AbstractResult):
 
     runs: tuple[SimulatedRun, ...]
 
+    @classmethod
+    def load(cls, folder: str | Path, effects: Sequence[type[AbstractEffect]] = ()) -> "Simulation":
+        """The simulation that `save` wrote to `folder`; `effects` are a user's own that the vehicle has.
+
+        **Raises** `InputError` where there is none.
+        """
+        kept, vehicle = stored(Path(folder), cls.__name__), read_vehicle(Path(folder) / VEHICLE, effects)
+        runs = []
+        for index, (recording, own) in enumerate(zip(kept.recordings, kept.text["simulated"], strict=True)):
+            outputs, stacked = kept.arrays[f"outputs/{index}"], batch(vehicle, [recording]).padded()
+            more = stacked.times.shape[1] - len(outputs)
+            tests = channel_errors(vehicle, stacked, jnp.pad(jnp.asarray(outputs), ((0, more), (0, 0)))[None])
+            state, findings = kept.arrays[f"state/{index}"], findings_of(own["findings"])
+            runs.append(SimulatedRun(vehicle, recording, outputs, own["start"], state, *tests, findings))
+        return cls(tuple(runs))
+
     def __len__(self) -> int:
         return len(self.runs)
 
@@ -219,9 +240,16 @@ class Simulation(AbstractResult):
         return xarray.DataTree.from_dict({run.recording.name: run.to_xarray() for run in self.runs})
 
     def write(self, folder: Path) -> None:
-        """Write a recording for each run into `folder`."""
+        """Write a recording for each run, `vehicle.toml` and, from which `load` makes it again, `result.npz`."""
         for run in self.runs:
-            run.write(folder)
+            stem = Path(run.recording.name).stem
+            pieces = len(list(folder.glob(f"{stem}*.csv")))
+            save(run.answer(), folder / (f"{stem}-{pieces + 1}.csv" if pieces else f"{stem}.csv"))
+        write_vehicle(self.runs[0].vehicle, folder / VEHICLE)
+        arrays = {f"outputs/{index}": run.outputs for index, run in enumerate(self.runs)}
+        arrays |= {f"state/{index}": run.initial_state for index, run in enumerate(self.runs)}
+        own = [{"start": run.start, "findings": run.findings} for run in self.runs]
+        store(folder, type(self).__name__, {"simulated": own}, arrays, [run.recording for run in self.runs])
 
 
 def channel_errors(

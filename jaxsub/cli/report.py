@@ -2,13 +2,12 @@
 
 from pathlib import Path
 
+from ..api.diagnoses import IMPROVED
 from ..discrepancy.stored import STORED, load_conclusions
 from ..errors import InputError
 from ..report import write_report
 from . import terminal
 from .output import redrawn
-
-IMPROVED = "improved.toml"
 
 
 def run(folder: Path) -> None:

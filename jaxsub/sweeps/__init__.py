@@ -1,5 +1,6 @@
 """Sweeps: Monte-Carlo over initial guesses, noise, vehicles and recordings, on this machine or on a cluster."""
 
+from ..results import OUTCOMES
 from .answers import answered
 from .cluster import require_cluster
 from .dataset import open_sweep
@@ -7,7 +8,7 @@ from .description import described
 from .execute import sweep
 from .limits import require_memory
 from .plan import Chunk, Plan
-from .run import OUTCOMES, run_chunks
+from .run import run_chunks
 from .store import Store, check_folder
 from .summary import succeeded, summarised
 

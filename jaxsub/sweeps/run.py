@@ -9,20 +9,9 @@ from jaxtyping import Array, Float
 
 from ..estimate import METHODS, Problem, ends
 from ..estimate.method import share_for
-from ..results import RESULTS
+from ..results import OUTCOMES, RESULTS
 from .plan import Chunk, Plan
 
-# what became of a search, as stores have it: a number for each, which later versions may add to and not change
-OUTCOMES = (
-    "successful",
-    "nonlinear_max_steps_reached",
-    "nonlinear_divergence",
-    "nonfinite",
-    "nan_start",
-    "not_stationary",
-    "indefinite_inertia",
-    "other",
-)
 Answers = dict[str, np.ndarray]
 
 

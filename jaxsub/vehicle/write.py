@@ -42,7 +42,9 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     for line in comment.splitlines():
         document.add(tomlkit.comment(line))
     document.update({"schema": 1, "name": layout.name, "kind": layout.kind, "dof": list(layout.equations)})
-    own = {name: values[name] for name in vehicle.own_values()}
+    # numbers in the order of the file that they are from, which compiled programs do not keep
+    place = {name: index for index, name in enumerate(rows)}
+    own = {name: values[name] for name in sorted(vehicle.own_values(), key=lambda name: place.get(name, len(place)))}
     if isinstance(vehicle, SubmergedBody):
         document["body"] = _body_table(vehicle, own, rows)
         if vehicle.coriolis != CORIOLIS[0]:

@@ -108,6 +108,20 @@ def test_saved_results_replace_only_what_jaxsub_wrote(found, tmp_path):
     assert (tmp_path / "out" / "fitted.toml").read_text() == "mine"
 
 
+def test_a_saved_fit_is_loaded_as_it_was(found, tmp_path):
+    """Claim: all that it says, its covariance and what it was fitted to are those before; another folder is refused."""
+    found.save(tmp_path / "fit")
+    again = js.Fit.load(tmp_path / "fit")
+    assert (repr(again), again.summary(), again.values) == (repr(found), found.summary(), found.values)
+    np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-9)
+    np.testing.assert_array_equal(again.recordings[0].column("x"), found.recordings[0].column("x"))
+    assert again.plot().png == found.plot().png
+    with pytest.raises(js.InputError, match=r"give a folder that Simulation\.save wrote"):
+        js.Simulation.load(tmp_path / "fit")
+    with pytest.raises(js.InputError, match=r"does not exist; give a folder that Fit\.save wrote"):
+        js.Fit.load(tmp_path)
+
+
 def test_bad_arguments_are_one_clear_error(rig):
     """Claim: an unknown method, no free number and an absent column name what is wrong and what to do."""
     vehicle, run = rig
@@ -133,6 +147,10 @@ def test_simulation_is_that_of_the_command(files, rig, tmp_path, monkeypatch, ca
     assert list(shown.to_xarray().children) == list(dict.fromkeys(run.recording.name for run in shown.runs))
     assert len(shown) == 2 and "rms/σ" in repr(shown) and "rms/σ" in shown.summary()
     assert shown.plot(1)._repr_png_()[:4] == b"\x89PNG"
+    shown.save(tmp_path / "saved")
+    again = js.Simulation.load(tmp_path / "saved")
+    assert again.summary() == shown.summary() and again[1].to_json() == shown[1].to_json()
+    np.testing.assert_array_equal(again.to_dataframe(), shown.to_dataframe())
 
 
 def test_vehicle_and_recording_show_what_they_are(rig):

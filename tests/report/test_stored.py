@@ -32,6 +32,21 @@ def test_what_is_read_back_is_what_was_written(verdict, tmp_path):
         np.testing.assert_allclose(own.modelled["yaw"], theirs.modelled["yaw"], rtol=1e-6)
 
 
+def test_a_saved_diagnosis_is_loaded_as_it_was(written):
+    """Claim: verdict, tables, JSON and the improved vehicle are those before, and a next run if there is one."""
+    out, _ = written
+    made, again = diagnosis("named", samples=40), Diagnosis.load(out)
+    assert again.conclusions.to_json() == made.to_json() and again.next_run is None
+    assert (repr(again), again.summary()) == (repr(Diagnosis(made, dsrv())), Diagnosis(made, dsrv()).summary())
+    assert again.to_dataframe().equals(Diagnosis(made, dsrv()).to_dataframe())
+    assert again.improved.own_values().keys() == dsrv().own_values().keys()
+    (out / "next_manoeuvre.csv").write_text("t,delta_r\n0,0.1\n1,0.2\n")
+    planned = Diagnosis.load(out).next_run
+    assert planned is not None and len(planned.times) == 2
+    with pytest.raises(InputError, match="give the folder of a diagnosis"):
+        Diagnosis.load(out.parent)
+
+
 @pytest.fixture
 def written(tmp_path, monkeypatch):
     """A folder as `diagnose` leaves it, and a function that runs `jaxsub report` on it and returns its exit code."""

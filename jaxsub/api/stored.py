@@ -1,0 +1,87 @@
+"""What a saved result has beside the files of the commands, so that it can be loaded again: `result.npz`.
+
+It holds the recordings as they were used, arrays by name, and the rest as JSON: `{"schema": 1, "kind": …, …}`. Numbers
+are exact.
+"""
+
+import json
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..findings import Finding
+from ..plain import to_json
+from ..recording import Recording
+
+RESULT = "result.npz"
+_SCHEMA, _TEXT = 1, "content"
+# what reading a file that is none of ours may raise
+_DAMAGED = (ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, zipfile.BadZipFile, zlib.error)
+
+
+class Stored(NamedTuple):
+    """A result as it was stored: its text, its arrays by name, and the recordings that it is of."""
+
+    text: dict[str, Any]
+    arrays: dict[str, np.ndarray]
+    recordings: tuple[Recording, ...]
+
+
+def store(
+    folder: Path,
+    kind: str,
+    text: Mapping[str, Any],
+    arrays: Mapping[str, np.ndarray],
+    recordings: Sequence[Recording],
+) -> None:
+    """Write the result of a `kind` into `folder`."""
+    named = {f"own/{name}": array for name, array in arrays.items()}
+    runs = []
+    for index, run in enumerate(recordings):
+        named[f"run/{index}/times"] = run.times
+        named |= {f"run/{index}/{name}": values for name, values in run.columns.items()}
+        findings = [finding.to_json() for finding in run.findings]
+        runs.append({"name": run.name, "source": run.source, "first_row": run.first_row, "columns": list(run.columns),
+                     "units": dict(run.units), "findings": findings})  # fmt: skip
+    content = to_json({"schema": _SCHEMA, "kind": kind, "runs": runs, **text}).encode()
+    np.savez_compressed(folder / RESULT, **{_TEXT: np.frombuffer(content, np.uint8)}, **named)  # pyright: ignore[reportArgumentType]
+
+
+def stored(folder: Path, kind: str) -> Stored:
+    """What `store` wrote into `folder`.
+
+    **Raises** `InputError` where there is no result of that `kind`, or one of another version.
+    """
+    path, remedy = folder / RESULT, f"give a folder that {kind}.save wrote"
+    if not path.is_file():
+        raise InputError(str(path), "does not exist", remedy)
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            text = json.loads(bytes(arrays[_TEXT]))
+            found = text["schema"], text["kind"]
+            if found != (_SCHEMA, kind):
+                raise InputError(str(path), f"is a {found[1]} of schema {found[0]}", remedy)
+            own = {name.removeprefix("own/"): arrays[name] for name in arrays.files if name.startswith("own/")}
+            recordings = tuple(_recording(index, run, arrays) for index, run in enumerate(text.pop("runs")))
+    except _DAMAGED as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(str(path), "cannot be read", remedy) from error
+    return Stored(text, own, recordings)
+
+
+def _recording(index: int, run: dict[str, Any], arrays: Mapping[str, np.ndarray]) -> Recording:
+    columns = {name: arrays[f"run/{index}/{name}"] for name in run["columns"]}
+    times, findings = arrays[f"run/{index}/times"], findings_of(run["findings"])
+    return Recording(run["name"], times, columns, run["source"], run["first_row"], run["units"], findings=findings)
+
+
+def findings_of(listed: Sequence[Mapping[str, Any]]) -> tuple[Finding, ...]:
+    """Findings from JSON."""
+    pairs = lambda one: {key: tuple(map(tuple, one[key])) for key in ("rows", "times")}
+    return tuple(Finding(**{**one, **pairs(one)}) for one in listed)
