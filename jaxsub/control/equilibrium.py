@@ -109,7 +109,7 @@ def _conditions(
     body = layout.kind == "submerged-body"
     full: dict[str, Array | float] = dict(wanted)
     for name, instead, position in _LEVEL if body else ():
-        if len(full) < len(plant.inputs) and position in layout.positions and instead not in full:
+        if len(full) < len(plant.inputs) and layout.tells(position) and instead not in full:
             full.setdefault(name, 0.0)
     short = len(plant.inputs) - len(full)
     require_known("trim: wanted", full, (*producible(plant.vehicle), *plant.inputs), layout.name)

@@ -74,6 +74,8 @@ def axis(
     **Raises** `InputError` where the fins, by `coefficient`, turn nothing, or nothing damps the plane.
     """
     layout = vehicle.layout
+    if angle not in layout.positions and layout.tells(angle):
+        raise InputError(layout.name, "has its attitude as a quaternion", "delete model.attitude to fly an autopilot")
     by_state, by_fin = (np.asarray(part) for part in _derivatives(vehicle, at_rest(vehicle, 1)[0]))
     rows = [layout.equations.index(e) for e in plane if e in layout.equations]
     names = [name for name, _ in layout.inputs]

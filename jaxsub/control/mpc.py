@@ -100,7 +100,7 @@ class Mpc(eqx.Module):
         and a plant without trim.
         """
         layout = plant.vehicle.layout
-        track = {n: _SCALE[n] for n in ("z", "psi") if n in layout.positions} if track is None else track
+        track = {n: _SCALE[n] for n in ("z", "psi") if layout.tells(n)} if track is None else track
         within = {} if within is None else within
         require_known("mpc: channel", (*track, *within), producible(plant.vehicle), layout.name)
         for name, (low, high) in within.items():

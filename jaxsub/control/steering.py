@@ -78,7 +78,7 @@ class Depth(eqx.Module):
         without elevators or stern plane that pitch it, or without a depth.
         """
         fins = _require(vehicle, "pitch", (PAIR, ("elevator",), ("stern_plane",)))
-        if not {"z", "theta"} <= set(vehicle.layout.positions):
+        if not all(map(vehicle.layout.tells, ("z", "theta"))):
             raise InputError(vehicle.layout.name, "has no depth to hold", "free its heave and pitch")
         pitch = axis(vehicle, ("heave", "pitch"), "theta", dict.fromkeys(fins, 1.0), "M_delta_e or M_delta_s")
         inner = angle_loop(pitch, _PART * pitch.swiftness, _RESERVE * float(limits.amplitude))

@@ -3,11 +3,12 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..effects import CHANNEL_UNITS
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle, Layout
+from ..vehicle.attitude import EULER, QUATERNION, quaternion_of
 from ..vehicle.base import memory_states
 
 # how far an initial state that nothing measures may lie from rest: m/s, rad/s, rad, m
@@ -47,6 +48,11 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
             if there.any():
                 guess[run, i] = outputs[run, there, column][0]
                 spread[i] = max(spread[i], _change(times[run, there], outputs[run, there, column]))
+    if QUATERNION[0] in layout.states:
+        rows = [layout.states.index(name) for name in QUATERNION]
+        for run in range(len(guess)):
+            guess[run, rows] = quaternion_of(_first_angles(layout, mask[run], outputs[run]))
+        spread[rows] = 0.5 * _SPREAD["rad"]
     return tuple(jax.device_put((guess, spread)))
 
 
@@ -74,6 +80,15 @@ def _as_states(vehicle: AbstractVehicle, runs: Runs) -> Float[np.ndarray, "r k c
     """The outputs in the form of the states that they measure, by the sensors' present numbers."""
     sensors, columns = jax.tree.map(np.asarray, vehicle.sensors), np.asarray(runs.outputs)
     return np.stack([sensors.channel_of(o, columns[..., i]) for i, o in enumerate(vehicle.layout.outputs)], axis=-1)
+
+
+def _first_angles(layout: Layout, mask: Bool[np.ndarray, "k c"], outputs: Float[np.ndarray, "k c"]) -> list[float]:
+    """The first samples of roll, pitch and heading (rad) of a run, zero of an angle that nothing measures."""
+    angles = dict.fromkeys(EULER, 0.0)
+    for column, output in enumerate(layout.outputs):
+        if output.state in angles and mask[:, column].any():
+            angles[output.state] = float(outputs[mask[:, column], column][0])
+    return list(angles.values())
 
 
 def _fastest(runs: Runs, column: int) -> float:

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from ..arrays import Values, namespace
 from ..effects import CHANNEL_UNITS
 from ..vehicle import AbstractVehicle
+from ..vehicle.attitude import QUATERNION
 from .ekf import AbstractFilter
 from .mekf import ModifiedKalmanFilter
 from .noise import ConstantNoise
@@ -37,7 +38,9 @@ def state_scale(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[V
         known.setdefault("z", known["depth"])
     partner = _PARTNERS if layout.kind == "submerged-body" else {f"{e}_rate": e for e in layout.equations}
     partner = partner | {position: rate for rate, position in partner.items()}
-    usual = lambda name: np.asarray(_USUAL.get(CHANNEL_UNITS.get(name, ""), 1.0))
+    # the vector part of a quaternion is half an angle
+    unit = lambda name: "rad" if name in QUATERNION else CHANNEL_UNITS.get(name, "")
+    usual = lambda name: np.asarray(_USUAL.get(unit(name), 1.0))
     known |= {state: jnp.nan_to_num(vehicle.spreads[row.name]) for state, row in layout.deviations.items()}
     sizes = [known.get(n, known.get(partner.get(n, ""), usual(n))) for n in layout.states]
     return namespace(*sizes).stack(sizes)

@@ -9,6 +9,7 @@ from ..effects import EQUATIONS, GRAVITY, AbstractEffect, derivative, parameter_
 from ..errors import InputError
 from ..parameters import Parameter, number
 from .actuators import Actuators, stage_numbers
+from .attitude import EULER, QUATERNION
 from .base import Layout, memory_states
 from .checks import (
     check_coefficients,
@@ -16,6 +17,7 @@ from .checks import (
     check_effects,
     check_inputs,
     check_names,
+    check_turning,
     check_variation,
     require_inertia,
 )
@@ -57,6 +59,7 @@ def build(
     environment: Pairs = (),
     hull: dict[str, float] | None = None,
     coriolis: str = "linear",
+    attitude: str = "euler",
     system: str = "",
     ties: tuple[Tie, ...] = (),
     input_units: dict[str, str] | None = None,
@@ -77,7 +80,8 @@ def build(
     - `input_units`: SI units of inputs that have no symbol. `actuators`: those of a body; `numbers` has theirs too.
     - `sensor_numbers`: value and row of each scale, offset and mounting angle of a column.
     - `ties`: numbers that follow from others; `numbers` has them with any value.
-    - `coriolis`: of a body, one of `CORIOLIS`. `system`: in which the file gives its coefficients, as text.
+    - `coriolis`: of a body, one of `CORIOLIS`; `attitude`: one of `ATTITUDES`.
+    - `system`: in which the file gives its coefficients, as text.
     - `hull`: `length`, `diameter` (m; worked out from mass and inertia where absent), `reference_density` (kg/m³).
     - `effects`: those that the model has already, and `effect_rows` the rows of their free numbers.
 
@@ -102,7 +106,10 @@ def build(
     rows = tuple(dataclasses.replace(row, spread=0.0) for row in rows)
     equations = dof or EQUATIONS
     shown = tuple(output.state for output in outputs)
-    positions = _positions(equations, dict(prescribed), shown) if kind == "submerged-body" else equations
+    if attitude == "quaternion":
+        check_turning(equations, dict(prescribed), where)
+    turned = QUATERNION if attitude == "quaternion" else ()
+    positions = _positions(equations, dict(prescribed), shown, turned) if kind == "submerged-body" else equations
     positions += (*memory_states(effects), *(deviation(row.name) for row in rows if row.varies))
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
     layout = Layout(
@@ -163,10 +170,16 @@ def _sizes(values: dict, hull: dict[str, float]) -> dict[str, float]:
     return hull | {"length": length, "diameter": diameter}
 
 
-def _positions(equations: tuple[str, ...], prescribed: dict[str, str], shown: tuple[str, ...]) -> tuple[str, ...]:
-    """The position states a body needs: attitudes that can change, depth, and x and y where they are measured."""
-    turned = {"phi": "roll", "theta": "pitch", "psi": "yaw"}
-    states = [angle for angle, equation in turned.items() if equation in equations and angle not in prescribed]
+def _positions(
+    equations: tuple[str, ...], prescribed: dict[str, str], shown: tuple[str, ...], turned: tuple[str, ...]
+) -> tuple[str, ...]:
+    """The position states a body needs: attitudes that can change, depth, and x and y where they are measured.
+
+    The attitude is `turned`, or Euler angles where that is empty.
+    """
+    angles = dict(zip(EULER, EQUATIONS[3:], strict=True))
+    free = [angle for angle, equation in angles.items() if equation in equations and angle not in prescribed]
+    states = list(turned or free)
     states += [axis for axis in ("x", "y") if {"x", "y"} & set(shown)]
     return (*states, "z") if "z" not in prescribed else tuple(states)
 

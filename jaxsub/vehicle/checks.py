@@ -24,6 +24,7 @@ from ..effects import (
 from ..effects.derivatives import alike
 from ..errors import InputError, nearest
 from .actuators import Actuator
+from .attitude import EULER
 from .base import Layout
 from .inertia import indefinite
 from .mechanism import Mechanism
@@ -140,6 +141,15 @@ def check_coefficients(terms: Mapping[str, Derivative | None], layout: Layout, w
             )
     if same := alike(terms):
         raise InputError(f"{where}: coefficients.{same[1]}", f"says what {same[0]} says", "delete one")
+
+
+def check_turning(equations: tuple[str, ...], prescribed: Mapping[str, str], where: str) -> None:
+    """Refuse a quaternion of a body that does not turn, or of which a recording gives an angle."""
+    place = f"{where}: model.attitude"
+    if not set(equations) & set(EQUATIONS[3:]):
+        raise InputError(place, "is that of a body none of whose rotations is free", "delete it, or add one to dof")
+    for angle in set(EULER) & set(prescribed):
+        raise InputError(place, f"is a quaternion, and {angle} is prescribed", "delete one of them")
 
 
 def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:

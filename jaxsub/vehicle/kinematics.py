@@ -2,28 +2,12 @@
 
 from collections.abc import Mapping
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..arrays import Values, namespace
 from ..effects import GRAVITY, Motion, Signal
-
-
-@jax.custom_jvp
-def sine_cosine(angle: Float[Array, " *k"]) -> tuple[Float[Array, " *k"], Float[Array, " *k"]]:
-    """Sine and cosine of `angle` (rad), worked out once.
-
-    Without the barrier XLA fuses both into everything that uses them and works them out again in each: eighty times in
-    a step in place of sixteen, which was a third of the time that a batch of simulations took.
-    """
-    return jax.lax.optimization_barrier((jnp.sin(angle), jnp.cos(angle)))
-
-
-@sine_cosine.defjvp
-def _(primals: tuple[Array], tangents: tuple[Array]) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    sine, cosine = sine_cosine(*primals)
-    return (sine, cosine), (cosine * tangents[0], -sine * tangents[0])
+from .attitude import EULER, QUATERNION, down, quaternion_rates, sine_cosine, turned
 
 
 def position_rates(motion: Motion) -> dict[str, Signal]:
@@ -31,17 +15,19 @@ def position_rates(motion: Motion) -> dict[str, Signal]:
 
     $\dot\psi = (q\sin\phi + r\cos\phi)/\cos\theta$, $\dot\theta = q\cos\phi - r\sin\phi$,
     $\dot\phi = p + \dot\psi\sin\theta$, and $[\dot x\,\dot y\,\dot z] = R(\phi,\theta,\psi)[u\,v\,w]$ with z down.
+    Of an attitude by a quaternion also that one's rates.
     """
     u, v, w, p, q, r = (motion.rates[e] for e in ("surge", "sway", "heave", "roll", "pitch", "yaw"))
-    phi, theta, psi = (motion.positions[name] for name in ("phi", "theta", "psi"))
+    phi, theta, psi = (motion.positions[name] for name in EULER)
     (sin_phi, cos_phi), (sin_theta, cos_theta) = sine_cosine(jnp.asarray(phi)), sine_cosine(jnp.asarray(theta))
     turning = (q * sin_phi + r * cos_phi) / cos_theta
     across = v * cos_phi - w * sin_phi
     ahead = u * cos_theta + (v * sin_phi + w * cos_phi) * sin_theta
-    return {
-        "psi": turning,
-        "theta": q * cos_phi - r * sin_phi,
-        "phi": p + turning * sin_theta,
+    angles = {"psi": turning, "theta": q * cos_phi - r * sin_phi, "phi": p + turning * sin_theta}
+    if QUATERNION[0] in motion.positions:
+        moved = [row[0] * u + row[1] * v + row[2] * w for row in turned(motion.positions)]
+        return angles | quaternion_rates(motion) | dict(zip("xyz", moved, strict=True))
+    return angles | {
         "x": ahead * jnp.cos(psi) - across * jnp.sin(psi),
         "y": ahead * jnp.sin(psi) + across * jnp.cos(psi),
         "z": -u * sin_theta + (v * sin_phi + w * cos_phi) * cos_theta,
@@ -62,6 +48,13 @@ def rotation(
     return xp.stack([xp.stack(xp.broadcast_arrays(*row, cp * ct)[:3], -1) for row in rows], -2)
 
 
+def to_earth(positions: Mapping[str, Signal]) -> Float[Array, "*k 3 3"]:
+    """The rotation from body axes to those of the earth at the attitude `positions`."""
+    if QUATERNION[0] in positions:
+        return jnp.stack([jnp.stack(jnp.broadcast_arrays(*row), -1) for row in turned(positions)], -2)
+    return jnp.asarray(rotation(*(jnp.asarray(positions[name]) for name in EULER)))
+
+
 def specific_force(
     motion: Motion, acceleration: Mapping[str, Signal], arm: tuple[float, float, float]
 ) -> dict[str, Array]:
@@ -73,10 +66,9 @@ def specific_force(
     linear, angular = stack(motion.rates, ("surge", "sway", "heave")), stack(motion.rates, ("roll", "pitch", "yaw"))
     linear_rate = stack(acceleration, ("surge", "sway", "heave"))
     angular_rate = stack(acceleration, ("roll", "pitch", "yaw"))
-    phi, theta = motion.positions["phi"], motion.positions["theta"]
-    down = stack({"x": -jnp.sin(theta), "y": jnp.sin(phi) * jnp.cos(theta), "z": jnp.cos(phi) * jnp.cos(theta)}, "xyz")
+    low = jnp.stack(jnp.broadcast_arrays(*down(motion.positions)), -1)
     lever = jnp.asarray(arm)
     centripetal = jnp.cross(angular, jnp.cross(angular, jnp.broadcast_to(lever, angular.shape)))
     tangential = jnp.cross(angular_rate, jnp.broadcast_to(lever, angular.shape))
-    total = linear_rate + jnp.cross(angular, linear) + tangential + centripetal - GRAVITY * down
+    total = linear_rate + jnp.cross(angular, linear) + tangential + centripetal - GRAVITY * low
     return {"ax": total[..., 0], "ay": total[..., 1], "az": total[..., 2]}

@@ -5,6 +5,7 @@ import dataclasses
 from ..effects import VELOCITIES
 from ..effects.derivatives import INPUT_UNITS
 from ..parameters import Parameter
+from .attitude import EULER, QUATERNION
 from .sensors.output import ANGLES, SPECIFIC_FORCE, Output, channel_unit
 from .ties import Tie
 
@@ -84,9 +85,14 @@ class Layout:
 
     @property
     def angles(self) -> tuple[str, ...]:
-        """The columns, measured or of prescribed motions, that a whole turn leaves as they are."""
+        """The columns, measured or of prescribed motions, whose whole turns are counted, as a quaternion does not."""
         prescribed = (column for name, column in self.prescribed if self.is_angle(name))
-        return (*(output.column for output in self.outputs if self.is_angle(output.channel)), *prescribed)
+        measured = () if QUATERNION[0] in self.positions else self.outputs
+        return (*(output.column for output in measured if self.is_angle(output.channel)), *prescribed)
+
+    def tells(self, name: str) -> bool:
+        """Whether the position or angle `name` is among the states, an angle also by a quaternion."""
+        return name in self.positions or (name in EULER and QUATERNION[0] in self.positions)
 
     def is_angle(self, channel: str) -> bool:
         """Whether a whole turn leaves a channel as it is, as it does a body's Euler angles."""

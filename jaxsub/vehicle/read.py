@@ -21,7 +21,7 @@ from .scales import check_scaled, read_scales
 from .schema import Table, read_number, read_option, unknown_key
 from .sensors import quantities_of
 from .sensors.read import Reading, read_columns, read_outputs
-from .submerged_body import CORIOLIS, SubmergedBody
+from .submerged_body import ATTITUDES, CORIOLIS, SubmergedBody
 from .ties import Tie, read_tie
 from .toml import check_tree, read_toml
 
@@ -79,6 +79,7 @@ def vehicle_from(
     # only for a file with effects, since the vocabulary opens the metadata of every installed package
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)} if entries else {}
     built_in, effect_rows = _read_effects(entries, where, kinds, quantities)
+    coriolis, attitude = _read_model(top.table("model"))
     return build(
         where=where,
         name=top.word("name"),
@@ -86,7 +87,8 @@ def vehicle_from(
         dof=top.names("dof"),
         numbers=numbers,
         hull=extra,
-        coriolis=_read_model(top.table("model")),
+        coriolis=coriolis,
+        attitude=attitude,
         system=system,
         ties=(*ties, *devices.ties, *measured.ties),
         inputs=inputs,
@@ -101,10 +103,11 @@ def vehicle_from(
     )
 
 
-def _read_model(table: Table) -> str:
-    """Which products of velocities `[model]` has."""
-    table.only(("coriolis",))
-    return table.choice("coriolis", CORIOLIS) if "coriolis" in table.data else CORIOLIS[0]
+def _read_model(table: Table) -> tuple[str, str]:
+    """Which products of velocities `[model]` has, and how it says the attitude."""
+    table.only(("coriolis", "attitude"))
+    chosen = lambda key, known: table.choice(key, known) if key in table.data else known[0]
+    return chosen("coriolis", CORIOLIS), chosen("attitude", ATTITUDES)
 
 
 def _read_inputs(table: Table, body: bool, measured: Reading) -> tuple[tuple[tuple[str, str], ...], dict[str, str]]:

@@ -3,12 +3,10 @@
 from collections.abc import Mapping
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..effects import GRAVITY, Signal
 from .inertia import CENTRE_OF_GRAVITY
-from .kinematics import sine_cosine
 
 STANDARD_DENSITY = 1025.0
 
@@ -32,20 +30,19 @@ class Restoring(eqx.Module):
         displaced = self.values["buoyancy"] * density / self.reference_density
         return displaced + density * GRAVITY * environment["ballast"] if "ballast" in environment else displaced
 
-    def force(self, phi: Signal, theta: Signal, buoyancy: Array) -> dict[str, Array]:
-        """Generalised force by equation at the attitude `phi`, `theta` (rad) and displaced weight `buoyancy` (N)."""
+    def force(self, down: tuple[Signal, Signal, Signal], buoyancy: Array) -> dict[str, Array]:
+        """Generalised force by equation: `down` is that direction in body axes, `buoyancy` the displaced weight (N)."""
         excess = self.values["weight"] - buoyancy
         x, y, z = (self.values[name] * buoyancy for name in ("x_B", "y_B", "z_B"))
         if "x_G" in self.values:
             heavy = (self.values[name] * self.values["weight"] for name in CENTRE_OF_GRAVITY)
             x, y, z = (up - down for up, down in zip((x, y, z), heavy, strict=True))
-        (sin_phi, cos_phi), (pitched, cos_theta) = sine_cosine(jnp.asarray(phi)), sine_cosine(jnp.asarray(theta))
-        level, rolled = cos_phi * cos_theta, sin_phi * cos_theta
+        ahead, rolled, level = down
         return {
-            "surge": -excess * pitched,
+            "surge": excess * ahead,
             "sway": excess * rolled,
             "heave": excess * level,
             "roll": -y * level + z * rolled,
-            "pitch": x * level + z * pitched,
-            "yaw": -x * rolled - y * pitched,
+            "pitch": x * level - z * ahead,
+            "yaw": -x * rolled + y * ahead,
         }

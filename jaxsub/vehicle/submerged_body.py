@@ -16,6 +16,7 @@ from ..effects.hull import coriolis
 from ..parameters import number
 from .actuation import BodyActuation
 from .actuators import Actuators, stage_numbers
+from .attitude import QUATERNION, down, euler_angles
 from .base import AbstractVehicle, Layout, timed
 from .damping import Damping
 from .inertia import Inertia, sparse
@@ -28,6 +29,7 @@ from .variation import sample_by_sample
 _POSITIONS = ("phi", "theta", "psi", "x", "y", "z")
 CURRENT = ("current_north", "current_east")
 CORIOLIS = ("linear", "rigid-body", "full")
+ATTITUDES = ("euler", "quaternion")
 
 
 class SubmergedBody(AbstractVehicle):
@@ -39,6 +41,7 @@ class SubmergedBody(AbstractVehicle):
     $\nu_r = \nu - [v_c\,0]$: $\tilde M\dot\nu_r$ equals the same forces, and $\dot v_c = v_c\times\nu_2$ in body axes.
     Source: Fossen (2021), §6.8 and §10.3.
 
+    The attitude is Euler angles or, without their singularity at 90° of pitch, a unit quaternion.
     Locked degrees of freedom stay at rest, surge at the operating speed; a prescribed motion comes from a column of
     the recording instead. Forces of prescribed velocities act; those of prescribed accelerations are neglected.
 
@@ -65,6 +68,11 @@ class SubmergedBody(AbstractVehicle):
     actuators: Actuators = eqx.field(default_factory=Actuators)
     sensors: Sensors = eqx.field(default_factory=Sensors)
     spreads: dict[str, Array] = eqx.field(default_factory=dict)
+
+    @property
+    def attitude(self) -> str:
+        """One of `ATTITUDES`."""
+        return ATTITUDES[QUATERNION[0] in self.layout.positions]
 
     def mass_matrix(self) -> Float[Values, "n n"]:
         """Inertia of the free equations."""
@@ -114,6 +122,8 @@ class SubmergedBody(AbstractVehicle):
         if "u" not in known:
             rates["surge"] = zero + cruise
         positions = {name: known.get(name, zero) for name in (*_POSITIONS, *self.layout.positions)}
+        if QUATERNION[0] in positions:
+            positions |= euler_angles(positions)
         water = self._water(positions, environment, zero)
         return Motion(
             rates, positions, pick("input "), environment, self.inertia.matrix(), buoyancy, cruise, time,
@@ -125,9 +135,7 @@ class SubmergedBody(AbstractVehicle):
         total = self.products.force(motion)
         for equation, part in self.actuators.force(motion).items():
             total[equation] = total.get(equation, 0.0) + part
-        restoring = self.restoring.force(
-            motion.positions["phi"], motion.positions["theta"], jnp.asarray(motion.buoyancy)
-        )
+        restoring = self.restoring.force(down(motion.positions), jnp.asarray(motion.buoyancy))
         for equation, part in restoring.items():
             total[equation] = total.get(equation, 0.0) + part
         moved = [e for e in EQUATIONS if VELOCITIES[e] in dict(self.layout.prescribed)]

@@ -15,7 +15,7 @@ from .actuators import Actuators, actuator_tables
 from .assembly import BODY_KEYS, VECTORS
 from .base import AbstractVehicle
 from .sensors import column_entry, output_tables
-from .submerged_body import CORIOLIS, SubmergedBody
+from .submerged_body import ATTITUDES, CORIOLIS, SubmergedBody
 
 
 def write_vehicle(vehicle: AbstractVehicle, path: str | Path, comment: str = "") -> None:
@@ -47,8 +47,10 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     own = {name: values[name] for name in sorted(vehicle.own_values(), key=lambda name: place.get(name, len(place)))}
     if isinstance(vehicle, SubmergedBody):
         document["body"] = _body_table(vehicle, own, rows)
-        if vehicle.coriolis != CORIOLIS[0]:
-            document["model"] = {"coriolis": vehicle.coriolis}
+        model = {"coriolis": vehicle.coriolis, "attitude": vehicle.attitude}
+        usual = {"coriolis": CORIOLIS[0], "attitude": ATTITUDES[0]}
+        if stated := {key: word for key, word in model.items() if word != usual[key]}:
+            document["model"] = stated
     coefficients, tied = tomlkit.table(), {tie.name: tie.text for tie in layout.ties}
     devices = vehicle.actuators if isinstance(vehicle, SubmergedBody) else Actuators()
     for name in (name for name in own if name not in devices.values() | vehicle.sensors.numbers):

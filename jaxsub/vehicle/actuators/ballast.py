@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
-from ...effects import GRAVITY, Motion, Signal
-from ..kinematics import sine_cosine
+from ...effects import GRAVITY, Motion
+from ..attitude import down
 from .base import Actuator, Load, equations_of, line
 from .keys import Key, Number, Vector, Word
 
@@ -48,7 +47,10 @@ class Ballast(Actuator):
         """Weight and buoyancy along the body's axes."""
         density = -self.water(motion) if self.of == "volume" else 1.0
         excess = GRAVITY * density * self.value("gain", 1.0) * self.command(motion)
-        return [(excess * part, line(self.position, axis)) for part, axis in zip(_down(motion), np.eye(3), strict=True)]
+        return [
+            (excess * part, line(self.position, axis))
+            for part, axis in zip(down(motion.positions), np.eye(3), strict=True)
+        ]
 
 
 class MovingMass(Actuator):
@@ -86,18 +88,10 @@ class MovingMass(Actuator):
         weight = GRAVITY * self.numbers["mass"] * self.command(motion)
         return [
             (weight * part, _moment(self.direction, axis))
-            for part, axis in zip(_down(motion), np.eye(3), strict=True)
+            for part, axis in zip(down(motion.positions), np.eye(3), strict=True)
             if np.any(_moment(self.direction, axis))
         ]
 
 
 def _moment(arm: tuple[float, ...], force: tuple[float, ...] | np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros(3), np.cross(arm, force)])
-
-
-def _down(motion: Motion) -> tuple[Signal, Signal, Signal]:
-    """The downward direction in body axes."""
-    (sin_phi, cos_phi), (sin_theta, cos_theta) = (
-        sine_cosine(jnp.asarray(motion.positions[name])) for name in ("phi", "theta")
-    )
-    return -sin_theta, sin_phi * cos_theta, cos_phi * cos_theta

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from ...arrays import Values
 from ...effects import EQUATIONS, Motion, Signal
 from ...parameters import number
-from ..kinematics import rotation, specific_force
+from ..kinematics import rotation, specific_force, to_earth
 from .earth import radii
 from .output import GEODETIC, POSITION, SPECIFIC_FORCE, TRIADS, TURNING, VELOCITY, WRAPS, Output
 from .water import depth_at, pressure
@@ -141,8 +141,7 @@ def _position(output: Output, channel: str, channels: Mapping[str, Signal], moti
     if not any(output.lever_arm):
         return channels[channel]
     row = {"x": 0, "y": 1}.get(channel, 2)
-    turned = rotation(*(jnp.asarray(motion.positions[name]) for name in ("phi", "theta", "psi")))
-    return channels[channel] + turned[..., row, :] @ jnp.asarray(output.lever_arm)
+    return channels[channel] + to_earth(motion.positions)[..., row, :] @ jnp.asarray(output.lever_arm)
 
 
 def _stacked(named: Mapping[str, Signal], keys: tuple[str, ...]) -> Float[Array, "*k 3"]:
