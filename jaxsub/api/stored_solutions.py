@@ -47,10 +47,14 @@ def stored_solution(folder: Path, effects: Sequence[type[AbstractEffect]]) -> tu
     kept = stored(folder, _KIND)
     search, vehicle = kept.text["search"], read_vehicle(folder / FITTED, effects)
     runs = dataclasses.replace(batch(vehicle, kept.recordings).padded(), substeps=search["substeps"])
+    start, sigma, cost, steps = (jnp.asarray(kept.arrays[name]) for name in _ARRAYS)
     end = SearchEnd(
         vehicle,
         runs,
-        *(jnp.asarray(kept.arrays[name]) for name in _ARRAYS),
+        start,
+        sigma,
+        cost,
+        steps,
         getattr(RESULTS, search["outcome"]),
         known_start=search["known_start"],
         estimated_spreads=tuple(search["estimated_spreads"]),
