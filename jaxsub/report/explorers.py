@@ -8,12 +8,13 @@ import numpy as np
 from ..discrepancy.diagnosis import Conclusions, ForceTrace, Overlay
 from .by_state import state_unit
 from .drawing import BASELINE, IMPROVED, INK, thinned
-from .exploring import Choice, Drawing, Explorer, lines
+from .exploring import Choice, Drawing, Explorer, lines, tips
 from .forces import force_unit, telling_trace
 from .overlay import affected_channels, telling_overlay
 from .spectra import spectrum
 from .text import symbol, unit
 
+_TIME, _FREQUENCY, _LAG = ("time", "time", "s"), ("frequency", "frequency", "Hz"), ("lag", "lag", "s")
 _COLORS = {"baseline": BASELINE, "improved": IMPROVED}
 
 
@@ -42,7 +43,10 @@ def _residuals(diagnosis: Conclusions) -> Explorer | None:
         known = diagnosis.quality.get(channel)
         said, sigma = (f" ({unit(known.unit) or '1'})", 2.0 * known.sigma) if known else ("", 0.0)
         made.keep(f"{c}", value=f"{symbol(channel)}{said}", residual=f"residual{said}", low=-sigma, high=sigma)
-        made.keep(f"{c}", density=f"{said.strip() or 'unit'}²/Hz")
+        squared, own = f"{said.strip() or 'unit'}²/Hz", unit(known.unit) if known else ""
+        made.keep(f"{c}", density=squared)
+        made.keep(f"{c}/tips", values=tips(_TIME, ("measured", *models), own), residual=tips(_TIME, models, own))
+        made.keep(f"{c}/tips", density=tips(_FREQUENCY, models, squared), correlation=tips(_LAG, models, ""))
         left = {model: one[channel] for model, one in diagnosis.remains.items() if channel in one}
         lags = next(iter(left.values())).delays if left else np.empty(0)
         noise = 2.0 / np.sqrt(max(1, *(one.samples for one in left.values()), 1))
@@ -50,18 +54,19 @@ def _residuals(diagnosis: Conclusions) -> Explorer | None:
     place = "{run}/{channel}"
     over_time = {"time": f"{place}/time", "measured": f"{place}/measured"} | {m: f"{place}/{m}" for m in models}
     values = made.panel("values", "time (s)", "{channel}/value", 300)
-    lines(values, made.source("series", over_time), "time", {"measured": INK, **models}, ("measured",))
+    measured = {"measured": INK, **models}
+    lines(made, values, made.source("series", over_time), "time", measured, "{channel}/tips/values", ("measured",))
     residual = made.panel("residual", "time (s)", "{channel}/residual", 240, x_range=values.x_range)
     columns = {"time": f"{place}/time"} | {m: f"{place}/{m}_residual" for m in models}
     made.band(residual, "{channel}/low", "{channel}/high")
-    lines(residual, made.source("left", columns), "time", models, tuple(models))
+    lines(made, residual, made.source("left", columns), "time", models, "{channel}/tips/residual", tuple(models))
     density = made.panel("density", "frequency (Hz)", "{channel}/density", 260, x_axis_type="log", y_axis_type="log")
     columns = {"frequency": f"{place}/frequency"} | {m: f"{place}/{m}_density" for m in models}
-    lines(density, made.source("densities", columns), "frequency", models)
+    lines(made, density, made.source("densities", columns), "frequency", models, "{channel}/tips/density")
     correlation = made.panel("correlation", "lag (s)", "autocorrelation, all test runs", 260)
     made.band(correlation, "{channel}/no_noise", "{channel}/noise")
     columns = {"lag": "{channel}/lag"} | {m: f"{{channel}}/{m}" for m in models}
-    lines(correlation, made.source("correlations", columns), "lag", models)
+    lines(made, correlation, made.source("correlations", columns), "lag", models, "{channel}/tips/correlation")
     first = channels.index(affected_channels(diagnosis, telling)[0])
     choices = [
         Choice("run", [overlay.run for overlay in overlays], overlays.index(telling)),
@@ -106,16 +111,20 @@ def _forces(diagnosis: Conclusions) -> Explorer | None:
         _keep_forces(made, str(r), trace, after.get(trace.run), equations, states)
     for e, equation in enumerate(equations):
         made.keep(f"{e}", force=f"force, {symbol(equation)} ({force_unit(equation)})")
+        made.keep(f"{e}/tips", time=tips(_TIME, _lacking(bool(after)), force_unit(equation)))
     units = {name: known.unit for name, known in diagnosis.quality.items()}
+    modelled = any(trace.modelled for trace in after.values())
     for s, state in enumerate(states):
         said = state_unit(state, units)
         made.keep(f"state {s}", value=f"{symbol(state)} ({said})" if said else symbol(state))
+        for e, equation in enumerate(equations):
+            over = tips(("state", symbol(state), said), _by_state(modelled), force_unit(equation))
+            made.keep(f"{e}/state {s}", tips=over)
     panels = [_over_time(made, bool(after))]
     choices = [Choice("run", [trace.run for trace in traces], traces.index(telling))]
     located = [place.where for place in diagnosis.where if place.where in equations]
     choices.append(Choice("equation", equations, equations.index(located[0]) if located else 0))
     if states:
-        modelled = any(trace.modelled for trace in after.values())
         panels.append(_over_state(made, modelled))
         grows = " ".join(diagnosis.where[0].grows_with) if diagnosis.where else ""
         first = next((s for s, state in enumerate(states) if state in grows.replace("*", " ").split()), 0)
@@ -151,21 +160,29 @@ def _keep_forces(
 
 def _over_time(made: Drawing, improved: bool) -> Any:
     place = "{run}/{equation}"
-    forces = {"baseline_lacks": BASELINE} | ({"improved_lacks": IMPROVED} if improved else {})
     columns = {"time": f"{place}/time", "low": f"{place}/low", "high": f"{place}/high"}
     columns |= {"baseline_lacks": f"{place}/lacking"}
     columns |= {"improved_lacks": f"{place}/left"} if improved else {}
     panel = made.panel("missing", "time (s)", "{equation}/force", 300)
     source = made.source("lacking", columns)
     panel.varea("time", "low", "high", source=source, color=BASELINE, alpha=0.2, legend_label="its ±2σ")
-    lines(panel, source, "time", forces)
+    lines(made, panel, source, "time", _lacking(improved), "{equation}/tips/time")
     return panel
 
 
+def _lacking(improved: bool) -> dict[str, str]:
+    return {"baseline_lacks": BASELINE} | ({"improved_lacks": IMPROVED} if improved else {})
+
+
+def _by_state(modelled: bool) -> dict[str, str]:
+    return {"by_the_recordings": BASELINE} | ({"by_the_effects": IMPROVED} if modelled else {})
+
+
 def _over_state(made: Drawing, modelled: bool) -> Any:
-    shown = {"by_the_recordings": BASELINE} | ({"by_the_effects_added": IMPROVED} if modelled else {})
+    shown = _by_state(modelled)
     columns = {"state": "{run}/state {state}/value", "by_the_recordings": "{run}/{equation}/recorded"}
-    columns |= {"by_the_effects_added": "{run}/{equation}/modelled"} if modelled else {}
+    columns |= {"by_the_effects": "{run}/{equation}/modelled"} if modelled else {}
     panel = made.panel("over-state", "state {state}/value", "{equation}/force", 300)
-    lines(panel, made.source("by-state", columns), "state", shown, tuple(shown))
+    source, pattern = made.source("by-state", columns), "{equation}/state {state}/tips"
+    lines(made, panel, source, "state", shown, pattern, tuple(shown))
     return panel

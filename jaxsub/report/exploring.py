@@ -6,7 +6,7 @@ A figure's arrays lie in one store by name. A choice of a run or channel fills t
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # float32 values of all arrays of a figure: an eighth of a page's 3 MB once they are text
 _MOST_VALUES = 70_000
 _LEAST, _MOST = 100, 2000  # points of one line
-_UNITS = {"time": "time (s)", "frequency": "frequency (Hz)", "lag": "lag (s)"}
+Tips = list[tuple[str, str]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,8 +64,8 @@ class Drawing:
         self.store: dict[str, Any] = {}
         self.bindings: list[tuple[str, str, str | dict[str, str]]] = []
 
-    def keep(self, place: str, **values: np.ndarray | str | float) -> None:
-        """Store arrays, labels and numbers under `place/NAME`."""
+    def keep(self, place: str, **values: np.ndarray | str | float | Tips) -> None:
+        """Store arrays, labels, numbers and lines of text under the pointer as `place/NAME`."""
         from bokeh.models import PlainText
 
         for key, value in values.items():
@@ -134,8 +134,26 @@ def _padded(columns: Mapping[str, np.ndarray | None]) -> dict[str, np.ndarray]:
     return {name: missing if values is None else values for name, values in columns.items()}
 
 
-def lines(panel: Any, source: "ColumnDataSource", x: str, columns: Mapping[str, str], dots: Sequence[str] = ()) -> None:
-    """Each of `columns` with its colour over `x`, as a line or as `dots`, and values under the pointer."""
+def tips(x: tuple[str, str, str], columns: Iterable[str], unit: str) -> Tips:
+    """What is shown under the pointer: of the column `x`, with its label and unit, and of `columns` in their `unit`."""
+    column, label, own = x
+    named = ((label, column, own), *((name.replace("_", " "), name, unit) for name in columns))
+    return [(said, f"@{name}{{%.4g}} {of}".rstrip()) for said, name, of in named]
+
+
+def lines(
+    made: Drawing,
+    panel: Any,
+    source: "ColumnDataSource",
+    x: str,
+    columns: Mapping[str, str],
+    shown: str,
+    dots: Sequence[str] = (),
+) -> None:
+    """Each of `columns` with its colour over `x`, as a line or as `dots`.
+
+    Under the pointer is what the pattern `shown` leads to, by `tips`: values with their units.
+    """
     from bokeh.models import HoverTool
 
     for name, color in columns.items():
@@ -144,15 +162,15 @@ def lines(panel: Any, source: "ColumnDataSource", x: str, columns: Mapping[str, 
             drawn = panel.scatter(x, name, source=source, size=3.5, color=color, alpha=0.6, legend_label=label)
         else:
             drawn = panel.line(x, name, source=source, color=color, line_width=1.6, legend_label=label)
-    values = [(name.replace("_", " "), f"@{name}{{%.4g}}") for name in columns]
     formatters: dict[str, Any] = {f"@{name}": "printf" for name in (x, *columns)}
     mode = "mouse" if dots and len(dots) == len(columns) else "vline"
-    hover = HoverTool(
-        renderers=[drawn], tooltips=[(_UNITS.get(x, x), f"@{x}{{%.4g}}"), *values], formatters=formatters, mode=mode
-    )
+    hover = HoverTool(name=f"{panel.name}-hover", renderers=[drawn], formatters=formatters, mode=mode)
+    made.bindings.append((str(hover.name), "tooltips", shown))
     panel.add_tools(hover)
     panel.legend.click_policy = "hide"
     panel.legend.orientation = "horizontal"
+    # so narrow that it fits a telephone
+    panel.legend.ncols, panel.legend.spacing, panel.legend.label_text_font_size = 2, 0, "12px"
     panel.legend.location = "left"
     panel.legend.margin = panel.legend.padding = 0
     panel.legend.border_line_color = None

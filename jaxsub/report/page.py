@@ -3,7 +3,6 @@
 import base64
 import hashlib
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,9 +101,7 @@ def _added(diagnosis: Conclusions, vehicle_text: str) -> str:
 
 
 def _explorers(diagnosis: Conclusions) -> "dict[str, Explorer]":
-    """The figures to explore; without Bokeh, as in an environment made with --no-deps, still pictures are all."""
-    if find_spec("bokeh") is None:
-        return {}
+    # imported here, since Bokeh takes two seconds that a command without a report need not spend
     from .explorers import explorers
 
     return explorers(diagnosis)
