@@ -1,4 +1,7 @@
-"""`python -m notebooks.site --out DIR`: write the site; exit 1, and say why, where it would be faulty."""
+"""`python -m notebooks.site --out DIR`: write the site; exit 1, and say why, where it would be faulty.
+
+With `--release NAME` it is written to DIR/NAME, beside other releases, and its pages have a chooser of these.
+"""
 
 import argparse
 import shutil
@@ -9,16 +12,20 @@ from pathlib import Path
 from .check import faults
 from .pages import write_pages
 from .reference import Reference
+from .versions import chooser, write_versions
 
 
-def build(out: Path) -> list[str]:
-    """Write the site into `out`, which is emptied first; what is wrong with it, a line each."""
+def build(out: Path, chooser: str = "") -> list[str]:
+    """Write the site into `out`, which is emptied first; what is wrong with it, a line each.
+
+    Its pages have the script of a `chooser` of versions, if there is one.
+    """
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         reference = Reference.of("jaxsub")
-        found = [*reference.undocumented(), *reference.write(out / "api"), *write_pages(out, reference)]
+        found = [*reference.undocumented(), *reference.write(out / "api"), *write_pages(out, reference, chooser)]
     found += [f"warning: {one.message} ({one.filename}:{one.lineno})" for one in caught if not _told(one)]
     return found + faults(out)
 
@@ -34,8 +41,12 @@ def main() -> None:
     """Arguments in, a site out."""
     parser = argparse.ArgumentParser(prog="python -m notebooks.site", description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
-    out = parser.parse_args().out
-    found = build(out)
+    parser.add_argument("--release", help="a version, which is kept beside others")
+    chosen = parser.parse_args()
+    out = chosen.out / chosen.release if chosen.release else chosen.out
+    found = build(out, chooser() if chosen.release else "")
+    if chosen.release:
+        write_versions(chosen.out)
     for line in found:
         print(line, file=sys.stderr)
     print(f"{out / 'index.html'}: {len(list(out.rglob('*.html')))} pages, {len(found)} faults")

@@ -23,6 +23,11 @@ _EXTRAS = ["fenced-code-blocks", "tables", "header-ids", "code-friendly", "cuddl
 GUIDES = (
     "index",
     "begin-a-vehicle-file",
+    "auv",
+    "glider",
+    "rov",
+    "ship",
+    "usv",
     "add-a-vehicle",
     "describe-your-sensors",
     "logs-and-data",
@@ -41,8 +46,8 @@ GUIDES = (
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)#\s]+)")
 
 
-def write_pages(out: Path, reference: Reference) -> list[str]:
-    """Write everything but the reference; what is wrong with it."""
+def write_pages(out: Path, reference: Reference, chooser: str = "") -> list[str]:
+    """Write everything but the reference, with the script of a `chooser` of versions if there is one; what is wrong."""
     found = []
     guides = [NOTEBOOKS / "guide" / f"{name}.md" for name in GUIDES]
     measurements = [ROOT / "experiments" / "README.md", *sorted((ROOT / "experiments").glob("*/README.md"))]
@@ -69,7 +74,7 @@ def write_pages(out: Path, reference: Reference) -> list[str]:
     }
     style = (HERE / "templates" / "site.css").read_text(encoding="utf-8")
     for page in everything:
-        made = template.render(page=page, menu=menu, style=style, rooms=_rooms(reference))
+        made = template.render(page=page, menu=menu, style=style, rooms=_rooms(reference), chooser=chooser)
         (out / page.address).write_text(made, encoding="utf-8")
     (out / "search.js").write_text(search.script(everything, reference.addresses), encoding="utf-8")
     return found + missing

@@ -13,7 +13,7 @@ pytest.importorskip("markdown2")
 pytest.importorskip("nbconvert")
 pytest.importorskip("latex2mathml")
 
-from notebooks.site import check, mathematics, pages, search
+from notebooks.site import check, mathematics, pages, search, versions
 from notebooks.site.reference import Reference
 
 
@@ -62,6 +62,22 @@ def test_a_browser_lists_what_has_every_word_titles_first(tmp_path, words, expec
     shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert re.findall(r'<li><a href="([^"]+)"', shown) == expected
     assert ("Nothing was found." in shown.partition("<script")[0]) is not bool(expected)
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no Chromium")
+def test_a_browser_lists_the_versions_beside_a_page_the_newest_first(tmp_path):
+    """Claim: from a file, with the page's own version chosen; the folder's first page leads to the newest."""
+    for name in ("0.9.0", "0.10.0"):
+        (tmp_path / name).mkdir()
+        script = f'<script src="../{versions.LIST}"></script><script>{versions.chooser()}</script>'
+        (tmp_path / name / "index.html").write_text(f'<select id="version" hidden></select>{script}')
+    versions.write_versions(tmp_path)
+    assert "url=0.10.0/index.html" in (tmp_path / "index.html").read_text()
+    address = f"file://{tmp_path}/0.9.0/index.html"
+    command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", address]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert re.findall(r'<option value="([^"]+)"( selected="")?', shown) == [("0.10.0", ""), ("0.9.0", ' selected=""')]
+    assert "hidden" not in re.findall(r"<select[^>]*>", shown)[0]
 
 
 def test_formulas_become_mathml_and_code_is_left():
