@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .information import Identifiability
     from .recording import Recording, Selection, from_pandas, from_xarray, hold_out, load, save, split
     from .simulation import doublet, prbs, synthetic, three_two_one_one
-    from .vehicle import initial_file, read_vehicle, vehicle_from, vehicle_text, write_vehicle
+    from .vehicle import Model, initial_file, own_model, read_vehicle, vehicle_from, vehicle_text, write_vehicle
 
     __version__: str
 
@@ -30,6 +30,7 @@ __all__ = [
     "Fit",
     "Identifiability",
     "InputError",
+    "Model",
     "Mpc",
     "Plant",
     "Recording",
@@ -51,6 +52,7 @@ __all__ = [
     "initial_file",
     "linearise",
     "load",
+    "own_model",
     "prbs",
     "read_vehicle",
     "save",
@@ -80,7 +82,7 @@ _NAMES = {
     "information": "Identifiability",
     "recording": "Recording Selection from_pandas from_xarray hold_out load save split",
     "simulation": "doublet prbs synthetic three_two_one_one",
-    "vehicle": "initial_file read_vehicle vehicle_from vehicle_text write_vehicle",
+    "vehicle": "Model initial_file own_model read_vehicle vehicle_from vehicle_text write_vehicle",
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

@@ -10,7 +10,7 @@ import numpy as np
 import tomlkit
 
 from jaxsub.simulation.manoeuvres import doublet, prbs, square, three_two_one_one
-from jaxsub.vehicle import AbstractVehicle, Mechanism, SubmergedBody, vehicle_from
+from jaxsub.vehicle import AbstractVehicle, vehicle_from
 from jaxsub.vehicle.catalogue import dsrv, nps_auv_ii
 from jaxsub.vehicle.write import vehicle_text
 
@@ -24,7 +24,7 @@ LARGEST_RUDDER = 0.32
 _DIVE = {"nps-altitude": 0.5, "nps-shallow": 0.35}
 
 
-def body(name: str, channels: tuple[str, ...] = ()) -> SubmergedBody | Mechanism:
+def body(name: str, channels: tuple[str, ...] = ()) -> AbstractVehicle:
     """The true vehicle, with all of its channels or those given."""
     if name == "rig":
         return vehicle_from(_RIG, "rig")

@@ -79,6 +79,7 @@ class Motion(eqx.Module):
     - `accelerations`: rates of the free equations' velocities, where an accelerometer needs them.
     - `water`: velocity of the water over ground in body axes (m/s), by the equation of the body's own; absent at rest.
     - `actuation`: the forces of the model's own actuators, each by itself.
+    - `first_order`: whether `rates` are the states themselves, as of a user's own model.
     """
 
     rates: dict[str, Signal]
@@ -92,6 +93,7 @@ class Motion(eqx.Module):
     accelerations: dict[str, Signal] = eqx.field(default_factory=dict)
     water: dict[str, Signal] = eqx.field(default_factory=dict)
     actuation: AbstractActuation | None = None
+    first_order: bool = eqx.field(static=True, default=False)
 
     @property
     def flow(self) -> dict[str, Signal]:
@@ -100,8 +102,12 @@ class Motion(eqx.Module):
 
 
 def velocities(motion: Motion) -> dict[str, Signal]:
-    """Rates of `motion` by their names in files: `u` for surge, `q_rate` for a mechanism's coordinate `q`."""
-    return {VELOCITIES.get(equation, f"{equation}_rate"): rate for equation, rate in motion.rates.items()}
+    """Rates of `motion` by their names in files: `u` for surge, `q_rate` for a mechanism's coordinate `q`.
+
+    Those of a model of first order are its states.
+    """
+    other = "" if motion.first_order else "_rate"
+    return {VELOCITIES.get(equation, f"{equation}{other}"): rate for equation, rate in motion.rates.items()}
 
 
 def by_name(motion: Motion) -> dict[str, Signal]:

@@ -5,10 +5,12 @@ from .assembly import build
 from .base import AbstractVehicle, Layout
 from .checks import require_inertia
 from .dimensions import check_units
+from .from_python import own_model
 from .gazebo import read_sdf, sdf_text
 from .initial import InitialFile, initial_file, published_file
 from .mechanism import Mechanism
 from .oddities import vehicle_findings
+from .own import Model, OwnModel
 from .read import read_vehicle, vehicle_from
 from .sensors import Output, Sensors, quantities_of, recorded_columns
 from .submerged_body import SubmergedBody
@@ -19,13 +21,16 @@ __all__ = [
     "InitialFile",
     "Layout",
     "Mechanism",
+    "Model",
     "Output",
+    "OwnModel",
     "Sensors",
     "SubmergedBody",
     "added_effects",
     "build",
     "check_units",
     "initial_file",
+    "own_model",
     "published_file",
     "quantities_of",
     "read_sdf",

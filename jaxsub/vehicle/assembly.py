@@ -25,6 +25,7 @@ from .damping import Damping
 from .inertia import CENTRE_OF_GRAVITY, RIGID, Inertia
 from .layout import deviation
 from .mechanism import Mechanism
+from .own import Model, OwnModel, check_model, model_of
 from .products import Products
 from .restoring import STANDARD_DENSITY, Restoring
 from .schema import unknown_key
@@ -42,6 +43,7 @@ VECTORS = {
     "centre_of_gravity": CENTRE_OF_GRAVITY,
 }
 
+Vehicle = SubmergedBody | Mechanism | OwnModel
 Numbers = dict[str, tuple[float, Parameter]]
 Pairs = tuple[tuple[str, str], ...]
 
@@ -51,6 +53,7 @@ def build(
     where: str,
     name: str,
     kind: str,
+    model: type[Model] | Model | None = None,
     dof: tuple[str, ...] | None,
     numbers: Numbers,
     inputs: Pairs,
@@ -67,16 +70,17 @@ def build(
     sensor_numbers: Numbers | None = None,
     effects: tuple[AbstractEffect, ...] = (),
     effect_rows: tuple[Parameter, ...] = (),
-) -> SubmergedBody | Mechanism:
+) -> Vehicle:
     """The vehicle of those parts.
 
     **Arguments**
 
-    - `where`: what errors name. `name`: of the vehicle. `kind`: `submerged-body` or `mechanism`. `dof`: its free
-      equations.
+    - `where`: what errors name. `name`: of the vehicle. `kind`: `submerged-body`, `mechanism` or `model`.
+    - `dof`: its free equations.
     - `numbers`: value (SI) and row of every body entry and coefficient; zero where the physics has one that is absent.
     - `inputs`, `prescribed`, `environment`: actuators, locked motions and surroundings, each with its column.
     - `outputs`: the measured channels.
+    - `model`: a user's equations, in place of a body's or a mechanism's.
     - `input_units`: SI units of inputs that have no symbol. `actuators`: those of a body; `numbers` has theirs too.
     - `sensor_numbers`: value and row of each scale, offset and mounting angle of a column.
     - `ties`: numbers that follow from others; `numbers` has them with any value.
@@ -104,12 +108,14 @@ def build(
     spreads = {row.name: number(row.spread or math.nan) for row in rows if row.varies}
     # a number of the vehicle and not of its layout, for which programs are compiled
     rows = tuple(dataclasses.replace(row, spread=0.0) for row in rows)
-    equations = dof or EQUATIONS
+    equations = model.states if model is not None else dof or EQUATIONS
     shown = tuple(output.state for output in outputs)
     if attitude == "quaternion":
         check_turning(equations, dict(prescribed), where)
     turned = QUATERNION if attitude == "quaternion" else ()
-    positions = _positions(equations, dict(prescribed), shown, turned) if kind == "submerged-body" else equations
+    positions = equations if kind == "mechanism" else ()
+    if kind == "submerged-body":
+        positions = _positions(equations, dict(prescribed), shown, turned)
     positions += (*memory_states(effects), *(deviation(row.name) for row in rows if row.varies))
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
     layout = Layout(
@@ -117,7 +123,9 @@ def build(
         ties=ties, input_units=tuple((input_units or {}).items()),
     )  # fmt: skip
     density = hull.get("reference_density", STANDARD_DENSITY)
-    if kind == "mechanism":
+    if model is not None:
+        vehicle = _own(model, values, layout, effects, where)
+    elif kind == "mechanism":
         vehicle = _mechanism(values, layout, effects, where)
     else:
         devices = (actuators or Actuators()).in_water(density).with_values(values)
@@ -217,6 +225,12 @@ def _body(
         effects=effects,
         actuators=devices,
     )
+
+
+def _own(model: type[Model] | Model, values: dict, layout: Layout, effects: tuple, where: str) -> OwnModel:
+    made = model_of(model, values, where)
+    check_model(made, layout, where)
+    return OwnModel(model=made, layout=layout, effects=effects)
 
 
 def _mechanism(values: dict, layout: Layout, effects: tuple, where: str) -> Mechanism:

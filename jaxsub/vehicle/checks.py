@@ -25,9 +25,8 @@ from ..effects.derivatives import alike
 from ..errors import InputError, nearest
 from .actuators import Actuator
 from .attitude import EULER
-from .base import Layout
+from .base import AbstractVehicle, Layout
 from .inertia import indefinite
-from .mechanism import Mechanism
 from .products import ACTUATORS
 from .schema import unknown_key
 from .submerged_body import CURRENT, SubmergedBody
@@ -40,7 +39,7 @@ GRAMMAR = (
 )
 
 
-def require_inertia(vehicle: SubmergedBody | Mechanism, where: str) -> None:
+def require_inertia(vehicle: AbstractVehicle, where: str) -> None:
     """Raise `InputError` where the inertia matrix of `vehicle` is not positive definite.
 
     It says `where` and names the coefficients.
@@ -152,7 +151,7 @@ def check_turning(equations: tuple[str, ...], prescribed: Mapping[str, str], whe
         raise InputError(place, f"is a quaternion, and {angle} is prescribed", "delete one of them")
 
 
-def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
+def check_effects(vehicle: AbstractVehicle, where: str) -> None:
     """Refuse effects on what the vehicle lacks, and one that is there twice."""
     layout = vehicle.layout
     labels = [effect.label for effect in vehicle.effects]
@@ -174,7 +173,7 @@ def check_effects(vehicle: SubmergedBody | Mechanism, where: str) -> None:
                 raise InputError(place, f"no channel {channel}", f"use {hint}")
 
 
-def check_variation(vehicle: SubmergedBody | Mechanism, where: str) -> None:
+def check_variation(vehicle: AbstractVehicle, where: str) -> None:
     """Refuse numbers that differ by run where the model has no run: in what commands and columns pass before it."""
     inputs = tuple(name for name, _ in vehicle.layout.inputs)
     rows = {row.name: e for e in vehicle.effects for row in parameter_table(e).values()}
@@ -186,14 +185,14 @@ def check_variation(vehicle: SubmergedBody | Mechanism, where: str) -> None:
             raise InputError(f"{where}: {name}.varies", "cannot differ by run", f"delete it; these can: {known}")
 
 
-def _at_rest(vehicle: SubmergedBody | Mechanism) -> Motion:
+def _at_rest(vehicle: AbstractVehicle) -> Motion:
     """The motion at zero state and zero inputs."""
     layout = vehicle.layout
     state = jnp.zeros(len(layout.equations) + len(layout.positions))
     return vehicle.motion(state, jnp.zeros(len(layout.held) + len(layout.interpolated)))
 
 
-def _check_force(effect: AbstractForce, motion: Motion, vehicle: SubmergedBody | Mechanism, place: str) -> None:
+def _check_force(effect: AbstractForce, motion: Motion, vehicle: AbstractVehicle, place: str) -> None:
     """Refuse a force that such a `motion` cannot make, or that no free equation of the vehicle feels."""
     layout = vehicle.layout
     try:

@@ -100,9 +100,9 @@ class Layout:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states: velocities of the free equations (`v` of a body, `x_rate` of a mechanism), positions."""
-        body = self.kind == "submerged-body"
-        return (*(VELOCITIES[e] if body else f"{e}_rate" for e in self.equations), *self.positions)
+        """Names of the states: of the free equations (`v` of a body, `x_rate` of a mechanism, `x` else), positions."""
+        named = {"submerged-body": VELOCITIES.get, "mechanism": "{}_rate".format}.get(self.kind, str)
+        return (*(str(named(e)) for e in self.equations), *self.positions)
 
     @property
     def free(self) -> list[Parameter]:

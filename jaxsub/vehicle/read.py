@@ -13,25 +13,25 @@ from ..errors import InputError
 from ..parameters import Parameter
 from ..units import same_dimension
 from .actuators import read_actuators
-from .assembly import BODY_KEYS, VECTORS, build
+from .assembly import BODY_KEYS, VECTORS, Vehicle, build
 from .checks import check_count
 from .coefficient_units import coefficient_unit
-from .mechanism import Mechanism
+from .own import Model, channels_of, loaded
 from .scales import check_scaled, read_scales
 from .schema import Table, read_number, read_option, unknown_key
 from .sensors import quantities_of
 from .sensors.read import Reading, read_columns, read_outputs
-from .submerged_body import ATTITUDES, CORIOLIS, SubmergedBody
+from .submerged_body import ATTITUDES, CORIOLIS
 from .ties import Tie, read_tie
 from .toml import check_tree, read_toml
 
-_TOP = ("schema", "name", "kind", "dof", "coefficients", "inputs", "environment", "outputs", "effects")
+_TOP = ("schema", "name", "kind", "dof", "class", "coefficients", "inputs", "environment", "outputs", "effects")
 _OF_BODY = ("body", "model", "prescribed", "actuators")
 _SIZES = {"length": "m", "diameter": "m", "reference_density": "kg/m^3"}
 _MOST_EFFECTS = 100
 
 
-def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ()) -> SubmergedBody | Mechanism:
+def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ()) -> Vehicle:
     """The vehicle in the file at `path`, which may have `effects` of a user's own besides those of the vocabulary.
 
     **Raises** `InputError` that names the file and the key for anything that is not as formats.md has it.
@@ -40,23 +40,27 @@ def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ())
 
 
 def vehicle_from(
-    data: dict[str, Any], where: str, effects: Sequence[type[AbstractEffect]] = (), folder: Path | None = None
-) -> SubmergedBody | Mechanism:
+    data: dict[str, Any],
+    where: str,
+    effects: Sequence[type[AbstractEffect]] = (),
+    folder: Path | None = None,
+    model: type[Model] | Model | None = None,
+) -> Vehicle:
     """The vehicle described by `data`, a parsed vehicle file; `where` names it in errors, `effects` are a user's own.
 
-    `folder` holds the files that it names, the working directory where absent. **Raises** `InputError` as
-    `read_vehicle` does.
+    `folder` holds the files that it names, the working directory where absent. `model` has the equations of a vehicle
+    of kind `model`, in place of the file's class: a class, or a model whose numbers the file gives anew.
+    **Raises** `InputError` as `read_vehicle` does.
     """
     check_tree(data, where)
     top = Table(data, where, "")
     if type(top.required("schema")) is not int or data["schema"] != 1:
         raise InputError(f"{where}: schema", f"is {data['schema']!r:.60}", "this version reads schema = 1")
-    kind = top.choice("kind", ("submerged-body", "mechanism"))
-    for key in _OF_BODY if kind == "mechanism" else ():
-        if key in data:
-            remedy = "delete it; a mechanism has [coefficients], and [environment] for what its effects read"
-            raise InputError(f"{where}: {key}", "is a part of a submerged body", remedy)
+    kind = top.choice("kind", ("submerged-body", "mechanism", "model"))
+    _refuse_others(top, kind)
     top.only((*_TOP, *_OF_BODY))
+    if kind == "model" and model is None:
+        model = loaded(top.word("class"), folder or Path(), top.place("class"))
     body, extra = _read_body(top) if kind == "submerged-body" else ({}, {})
     if kind == "mechanism":
         top.required("dof")
@@ -70,7 +74,9 @@ def vehicle_from(
     )
     prescribed, _ = read_columns(top.table("prescribed"), ("scale", "offset"), measured)
     environment, _ = read_columns(top.table("environment"), (), measured)
-    read_outputs(top.table("outputs"), top.names("dof") or (), kind == "submerged-body", measured)
+    shown = () if model is None else channels_of(model, top.where)
+    shown = shown or tuple(form for q in top.names("dof") or () for form in (q, f"{q}_rate"))
+    read_outputs(top.table("outputs"), shown, kind == "submerged-body", measured)
     numbers = body | coefficients | devices.numbers
     # those with a symbol have their units by it
     named = [name for name in names if name in devices.input_units and not (body and name in INPUT_UNITS)]
@@ -87,6 +93,7 @@ def vehicle_from(
         dof=top.names("dof"),
         numbers=numbers,
         hull=extra,
+        model=model,
         coriolis=coriolis,
         attitude=attitude,
         system=system,
@@ -101,6 +108,18 @@ def vehicle_from(
         effects=(*(effect for effect, _ in devices.stages), *built_in),
         effect_rows=(*(row for _, row in devices.stages), *effect_rows),
     )
+
+
+def _refuse_others(top: Table, kind: str) -> None:
+    """Refuse the parts of a file that belong to another kind than its own."""
+    for key in _OF_BODY if kind != "submerged-body" else ():
+        if key in top.data:
+            remedy = f"delete it; a {kind} has [coefficients], and [environment] for what its effects read"
+            raise InputError(top.place(key), "is a part of a submerged body", remedy)
+    if kind == "model" and "dof" in top.data:
+        raise InputError(top.place("dof"), "is of a body or a mechanism", "delete it; a model's class names its states")
+    if kind != "model" and "class" in top.data:
+        raise InputError(top.place("class"), f"is given beside kind = {kind!r}", 'write kind = "model", or delete it')
 
 
 def _read_model(table: Table) -> tuple[str, str]:

@@ -14,6 +14,7 @@ from ..storage import written_whole
 from .actuators import Actuators, actuator_tables
 from .assembly import BODY_KEYS, VECTORS
 from .base import AbstractVehicle
+from .own import OwnModel, source_of
 from .sensors import column_entry, output_tables
 from .submerged_body import ATTITUDES, CORIOLIS, SubmergedBody
 
@@ -41,7 +42,8 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     document = tomlkit.document()
     for line in comment.splitlines():
         document.add(tomlkit.comment(line))
-    document.update({"schema": 1, "name": layout.name, "kind": layout.kind, "dof": list(layout.equations)})
+    document.update({"schema": 1, "name": layout.name, "kind": layout.kind})
+    document.update(_equations(vehicle))
     # numbers in the order of the file that they are from, which compiled programs do not keep
     place = {name: index for index, name in enumerate(rows)}
     own = {name: values[name] for name in sorted(vehicle.own_values(), key=lambda name: place.get(name, len(place)))}
@@ -81,6 +83,13 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     for effect in effects:
         document["effects"].append(_effect_table(effect, rows))
     return tomlkit.dumps(document)
+
+
+def _equations(vehicle: AbstractVehicle) -> dict[str, Any]:
+    """The free equations, or the class that has them."""
+    if isinstance(vehicle, OwnModel):
+        return {"class": source_of(type(vehicle.model))}
+    return {"dof": list(vehicle.layout.equations)}
 
 
 def _body_names() -> set[str]:

@@ -29,6 +29,7 @@ GUIDES = (
     "ship",
     "usv",
     "add-a-vehicle",
+    "own-models",
     "describe-your-sensors",
     "logs-and-data",
     "navigate",

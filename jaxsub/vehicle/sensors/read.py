@@ -57,13 +57,13 @@ class Reading:
                 raise InputError(table.place(key), "is 0", "give what one of the channel's unit is in the column")
 
 
-def read_outputs(table: Table, equations: tuple[str, ...], body: bool, found: Reading) -> None:
-    """The measured columns of `[outputs.*]`, into `found`; a mechanism has the coordinates `equations`.
+def read_outputs(table: Table, channels: tuple[str, ...], body: bool, found: Reading) -> None:
+    """The measured columns of `[outputs.*]`, into `found`; of what is no body there are those `channels`.
 
     **Raises** `InputError` for a key that its channel has not, a channel that there is not, two outputs of one name or
     column, and units that do not go together.
     """
-    known = (*CHANNEL_UNITS, *RAW_UNITS) if body else tuple(f for e in equations for f in (e, f"{e}_rate"))
+    known = (*CHANNEL_UNITS, *RAW_UNITS) if body else channels
     if not table.data:
         raise InputError(f"{table.where}: outputs", "names no measured channel", "add [outputs.r] and the like")
     if len(table.data) > _MOST:
