@@ -17,6 +17,7 @@ METHODS = ("gauss-newton", "newton", "newton-eq10", "nelder-mead", "gradient", "
 STARTS = ("rest", "recorded", "estimated")
 _SENSORS = "sensors"
 KINDS = ("auv", "glider", "rov", "ship", "usv")
+_RIG = "rig"
 SHELLS = ("bash", "zsh", "fish")
 PUBLISHED = (
     "bluerov2-heavy", "dsrv", "kvlcc2", "nps-auv-ii", "otter", "remus-100", "remus-100-linear", "rexrov", "seaglider",
@@ -181,7 +182,7 @@ def navigate(log: Path, sensors: Path, reference: Path | None, out: Path, overwr
 
 
 @app.command()
-@click.argument("kind", type=click.Choice((*KINDS, _SENSORS)), required=False)
+@click.argument("kind", type=click.Choice((*KINDS, _RIG, _SENSORS)), required=False)
 @click.argument("sensor_log", type=_PATH, required=False)
 @dimensions
 @click.option("--like", type=process.Name(PUBLISHED), help="A published vehicle in place of a kind.")
@@ -202,7 +203,8 @@ def init(
 ) -> None:
     """Begin a vehicle file: coefficients estimated from dimensions, with their uncertainty and source.
 
-    `jaxsub init sensors LOG` begins a sensor file for `jaxsub navigate`, by the names of a log's columns.
+    `jaxsub init rig --log RUN` begins a mechanism by the columns of a log. `jaxsub init sensors LOG` begins a sensor
+    file for `jaxsub navigate`, by the names of a log's columns.
     """
     if kind == _SENSORS:
         from . import init_sensors

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..recording import Recording, load, read_selection
-from ..vehicle import initial_file, published_file, vehicle_from
+from ..vehicle import initial_file, published_file, rig_file, vehicle_from
 from . import session, terminal
 from .output import fresh_file, paths_of
 
@@ -56,6 +56,14 @@ def _begun(
         return published_file(like, log)
     if kind is None:
         raise InputError("jaxsub init", "has no kind of vehicle", "give auv, rov and the like, or --like")
+    if kind == "rig":
+        if log is None:
+            raise InputError("jaxsub init rig", "has no log", "give --log run.csv, whose columns are the rig's")
+        if sizes:
+            raise InputError(
+                f"--{next(iter(sizes))}", "is no dimension of a rig", "delete it; a rig is begun by its log"
+            )
+        return rig_file(log)
     file = initial_file(kind, sizes, log)
     return file.text(), file.unused
 

@@ -7,7 +7,7 @@ from .checks import require_inertia
 from .dimensions import check_units
 from .from_python import own_model
 from .gazebo import read_sdf, sdf_text
-from .initial import InitialFile, initial_file, published_file
+from .initial import InitialFile, initial_file, published_file, rig_file
 from .mechanism import Mechanism
 from .oddities import vehicle_findings
 from .own import Model, OwnModel
@@ -37,6 +37,7 @@ __all__ = [
     "read_vehicle",
     "recorded_columns",
     "require_inertia",
+    "rig_file",
     "sdf_text",
     "vehicle_findings",
     "vehicle_from",

@@ -71,6 +71,20 @@ def test_a_published_vehicle_is_begun_with_the_columns_of_a_log(monkeypatch, cap
     assert vehicle.layout.channels == ("r", "v") and float(vehicle.values()["Y_v|v|"]) == -217.0
 
 
+def test_a_rig_is_begun_by_a_log_alone(tmp_path, monkeypatch, capsys):
+    """Claim: `init rig` writes a file that reads, from columns alone, and says what it lacks without a log."""
+    t = 0.05 * np.arange(60)
+    save(Recording("run", t, {"u": np.sign(np.sin(t)), "x": np.sin(2.0 * t)}, "run"), tmp_path / "run.csv")
+    code, printed = ran(monkeypatch, capsys, "init", "rig", "--log", tmp_path / "run.csv")
+    assert code == 0 and 'dof = ["x"]' in printed.out and "B_x_u" in printed.out
+    for given, said in (
+        (("rig",), "has no log"),
+        (("rig", "--log", tmp_path / "run.csv", "--mass", "1"), "no dimension"),
+    ):
+        code, printed = ran(monkeypatch, capsys, "init", *given)
+        assert code == 2 and said in printed.err
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [

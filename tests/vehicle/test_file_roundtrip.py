@@ -76,7 +76,9 @@ def test_written_vehicle_reads_back_the_same(make, tmp_path):
     assert type(again) is type(vehicle)
     values = {name: float(value) for name, value in again.values().items()}
     assert values == {name: float(value) for name, value in vehicle.values().items()}
-    assert dataclasses.replace(again.layout, parameters=()) == dataclasses.replace(vehicle.layout, parameters=())
+    # what is written is in SI, whatever system the file it is from has
+    bare = lambda v: dataclasses.replace(v.layout, parameters=(), system="")
+    assert bare(again) == bare(vehicle)
     # a row without a prior says nothing by its mean
     told = lambda v: {row.name: dataclasses.replace(row, prior_mean=0.0) for row in v.layout.parameters}
     fixed = {name for name, row in told(again).items() if not row.free}
