@@ -9,6 +9,7 @@ import pytest
 
 from jaxsub.cli.app import app
 from jaxsub.discrepancy import settings
+from jaxsub.effects import VOCABULARY
 from jaxsub.recording import read_selection
 
 GUIDES = sorted((Path(__file__).parents[2] / "notebooks" / "guide").glob("*.md"))
@@ -52,6 +53,16 @@ def commands():
 @pytest.mark.parametrize("words", list(commands()))
 def test_command_of_a_guide_is_understood(words):
     assert app.commands[words[0]].make_context(words[0], list(words[1:])).params
+
+
+LACKING = "## What such vehicles often lack"
+
+
+@pytest.mark.parametrize("path", [path for path in GUIDES if LACKING in path.read_text(encoding="utf-8")])
+def test_effects_that_a_guide_warns_of_can_be_named(path):
+    _, _, text = path.read_text(encoding="utf-8").partition(LACKING)
+    named = set(re.findall(r"`([a-z]+(?:-[a-z]+)+)`", text))
+    assert named and named <= {kind.name for kind in VOCABULARY}
 
 
 def test_map_of_a_guide_is_understood(tmp_path):
