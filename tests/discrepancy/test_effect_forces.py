@@ -4,6 +4,7 @@ import dataclasses
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from diagnosis_cases import recorded
 
 from jaxsub.discrepancy.effect_forces import effect_forces
@@ -21,6 +22,7 @@ def held(vehicle):
     return dataclasses.replace(vehicle, layout=dataclasses.replace(vehicle.layout, parameters=rows))
 
 
+@pytest.mark.long
 def test_the_force_by_the_recordings_is_the_true_one_where_the_model_has_half_of_it():
     """Claim: in pitch it follows the true damping, M_qq q|q|, though the model's is half as large."""
     damping = lambda size: QuadraticDamping("pitch", jnp.asarray(size))

@@ -5,6 +5,7 @@ from functools import cache
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from rigs import oscillator
 
 from jaxsub.discrepancy.acceptance import Model, ModelFitter
@@ -82,6 +83,7 @@ def view_of_truth():
     return led_from(true_pendulum(), runs, SIGMA, [STILL])
 
 
+@pytest.mark.long
 def test_a_free_run_begun_anew_is_the_motion_itself_where_nothing_is_wrong():
     """Claim: without noise, from the filter's states in 8 parts, every sample is that of the motion, in its place."""
     view, clean = view_of_truth(), batch(true_pendulum(), steered(0.0)[:2])
@@ -166,6 +168,7 @@ def test_what_is_not_asked_for_takes_nothing_else_along():
     assert all(gain.accepted for gain in gains.values())
 
 
+@pytest.mark.long
 def test_what_falls_over_is_known_by_what_comes_next():
     """Claim: from a file 15 % off, whose free run is lost, damping and spring are named, within three errors of the
     truth, and free runs through the held-out run err far less."""

@@ -83,6 +83,7 @@ def test_alternations_end_where_the_cost_stays_or_is_not_a_number(monkeypatch, c
     assert object.__new__(search).converged(iterate(0)).__dict__["number"] == turns
 
 
+@pytest.mark.long
 def test_numbers_that_the_recordings_do_not_tell_are_of_the_order_of_the_files():
     """Claim: undriven, the drive's gain stays where it was, to ten times it, or to the file's own spread."""
     still = driven(oscillator(), 0.1 * np.arange(100), 0, amplitude=0.0)

@@ -4,6 +4,7 @@ import dataclasses
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from rigs import driven, oscillator
 
 from jaxsub.discrepancy import diagnose
@@ -13,6 +14,7 @@ from jaxsub.simulation import synthetic
 KINDS = (AsymmetricDamping, CoulombFriction, CubicStiffness, QuadraticDamping)
 
 
+@pytest.mark.long
 def test_damping_that_differs_by_direction_is_named():
     """Claim: named alone beside dry friction with an offset, within three errors; held-out runs are at the noise."""
     truth = oscillator().with_effect(AsymmetricDamping("x", jnp.asarray(0.15)))

@@ -86,6 +86,7 @@ def test_optimum_is_that_of_scipy_on_an_exact_model(found):
     np.testing.assert_allclose(found.cost, best.cost, rtol=1e-5)
 
 
+@pytest.mark.long
 def test_file_whose_model_is_unstable_is_fitted_as_if_it_ran():
     """Claim: from REMUS as published, whose free run is lost in seconds, the fit ends where one from the truth ends."""
     file = remus_100()

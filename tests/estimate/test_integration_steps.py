@@ -100,6 +100,7 @@ def test_a_spring_that_turns_within_a_sample_is_simulated_below_the_noise():
     assert errors[0] > 1.0 and errors[1] < 0.1
 
 
+@pytest.mark.long
 def test_an_effect_that_turns_within_a_sample_is_fitted_with_its_own_numbers():
     """Claim: yield force and distance come out within three standard errors of the truth, though the trial steps once a
     sample until it has the effect."""

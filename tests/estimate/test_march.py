@@ -103,7 +103,7 @@ CASES = {
     "turns": lambda: turning(problem(body(), lengths=(30, 20), amplitude=0.3)),
     "every effect": lambda: problem(laden(), lengths=(6, 5), amplitude=0.02),
 }
-PARAMS = [pytest.param(case, marks=[pytest.mark.long] * (case == "every effect")) for case in CASES]
+PARAMS = [pytest.param(case, marks=[pytest.mark.long] * (case in ("turns", "every effect"))) for case in CASES]
 
 
 @pytest.fixture(scope="module", params=PARAMS)
@@ -176,6 +176,7 @@ def test_a_run_that_ended_may_go_anywhere_afterwards():
     close(fast.expand(y), made.expand(y))
 
 
+@pytest.mark.long
 def test_searches_end_where_they_end_by_jax():
     made = problem(coupled())
     starts = scattered(made, 0.3, 12, 0)

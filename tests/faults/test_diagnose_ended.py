@@ -63,6 +63,7 @@ def killed(files, tmp_path_factory):
     return found, out
 
 
+@pytest.mark.long
 def test_an_interrupted_diagnosis_ends_with_the_answer_so_far(files, tmp_path):
     """Claim: Ctrl-C gives the effect accepted so far, on the test run, as an incomplete answer with its report."""
     code, said, found = ended(files, tmp_path / "out", signal.SIGINT)

@@ -4,6 +4,7 @@ import dataclasses
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from rigs import driven, oscillator, stacked
 
 from jaxsub.estimate import SearchEnd, evaluate
@@ -35,6 +36,7 @@ def ratios(size, time, seed):
     return np.sqrt(np.diag(coloured.covariance) / np.diag(found.covariance)), coloured.disturbance
 
 
+@pytest.mark.long
 def test_white_residuals_of_a_long_run_leave_standard_errors_as_they_are():
     """Claim: a force that no window of samples can show, but the whole run would, widens no standard error."""
     ratio, _ = ratios(0.0, 1.0, seed=2)

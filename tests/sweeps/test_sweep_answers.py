@@ -61,6 +61,7 @@ def test_answers_agree_however_wide_the_chunks_are(done, tmp_path, width):
     assert farthest(done[1], sweep(plan(width=[width]), tmp_path / "out")) <= 1e-9
 
 
+@pytest.mark.long
 def test_answers_agree_on_two_devices(done, tmp_path):
     script = f"""
 import sys

@@ -207,6 +207,7 @@ def recordings(truth, seed):
     return synthetic(truth, [dataclasses.replace(r, columns=c) for r, c in zip(runs, grown, strict=True)], seed=seed)
 
 
+@pytest.mark.long
 def test_weak_drive_is_named_as_such():
     """Claim: a fifth less force than the file's, within three errors, beside play, drag and scales."""
     runs = recordings(cart(value=1.6), 1)
