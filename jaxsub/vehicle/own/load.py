@@ -13,6 +13,9 @@ from .model import Model
 def loaded(reference: str, folder: Path, place: str) -> type[Model]:
     """The class that `reference`, such as `tank.py:Tank`, names in `folder`; its file is run, once for each content.
 
+    It runs with the rights of the user, who should know where a vehicle file with a class comes from. No other kind of
+    vehicle file runs anything.
+
     **Raises** `InputError` for a file that there is not or that fails, and for what is no `Model` in it.
     """
     file, colon, name = reference.rpartition(":")
