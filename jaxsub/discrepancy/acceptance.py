@@ -17,7 +17,7 @@ from .name import Named, Naming, named_on, refitted, standing
 from .nonparametric import Pattern, most_explained
 from .programs import make_room
 from .progress import Progress
-from .rivals import told_apart
+from .rivals import robust_log_evidence
 from .selector import Selector
 from .settings import DOMINANT_SHARE, FORCE_RATIO, SIGNIFICANCE
 from .verdict import Judged, helped, settled
@@ -200,7 +200,7 @@ class CandidateModels:
         named = named_on(self.found.selector, others, index)
         numbers = [index, *(number for number in named.collinear if number not in others)]
         predicted = [self.model([*others, i]).predicted for i in numbers]
-        values = told_apart([self.log_evidence([*others, i]) for i in numbers], predicted)
+        values = robust_log_evidence([self.log_evidence([*others, i]) for i in numbers], predicted)
         fits = zip(numbers, values, strict=True)
         return sorted(fits, key=lambda fit: (not self.is_significant([*others, fit[0]]), -fit[1]))
 

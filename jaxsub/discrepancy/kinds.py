@@ -32,7 +32,7 @@ def kind(effect: AbstractEffect) -> str:
 
 
 def missing(named: Sequence[Named]) -> dict[str, float]:
-    """How probable it is of each kind that something of it is missing, by accepted effects and their rivals."""
+    """Posterior probability of each kind that an effect of it is missing, by accepted effects and their rivals."""
     absent: dict[str, float] = {}
     for one in named:
         of_kind: dict[str, float] = {}
@@ -44,7 +44,7 @@ def missing(named: Sequence[Named]) -> dict[str, float]:
 
 
 def leading(found: Examination) -> dict[str, float]:
-    """How probable each kind is as that of which a look at the recordings finds most."""
+    """Posterior probability of each kind that it holds the largest mismatch, by the first examination."""
     selector, scan = found.selector, found.naming.first
     values, nothing = selector.freely_valued() if found.naming.again else (scan.value, selector.value([]))
     of_name: dict[tuple[str, str], list[float]] = {}
@@ -66,7 +66,7 @@ def _sorted(probability: dict[str, float]) -> dict[str, float]:
 
 
 def right(view: View, file: AbstractVehicle) -> float:
-    """How probable numbers so far from the `file`'s are, of those that it leaves free, where the file's are right."""
+    """The p-value of the free numbers' distance from the `file`'s, under the null that the file's are right (χ²)."""
     names = [row.name for row in view.vehicle.layout.free]
     own, theirs = view.vehicle.values(), file.values()
     at = [i for i, name in enumerate(names) if name in theirs]

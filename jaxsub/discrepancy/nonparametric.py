@@ -201,13 +201,13 @@ class _Weighed:
         """The force with the parameters nearest to `heights` along the motion, and the share of squares it keeps."""
         G, _ = self.products[at].remaining(self.held, self.own)
         G = G * np.outer(self.length, self.length)
-        C, told = coarse(), float(heights @ G @ heights)
+        C, squares = coarse(), float(heights @ G @ heights)
         # knots without data are interpolated
         G = G + _ROUNDING * float(np.trace(G)) * np.eye(FINE)
         few = np.linalg.solve(C.T @ G @ C, C.T @ G @ heights)
         lost = float((heights - C @ few) @ G @ (heights - C @ few))
         numbers = {f"a_{j}": float(a) for j, a in enumerate(few)}
-        return with_numbers(force, numbers), 1.0 - lost / max(told, 1e-300)
+        return with_numbers(force, numbers), 1.0 - lost / max(squares, 1e-300)
 
 
 def most_explained(view: View, disturbance: Disturbance) -> float:

@@ -225,14 +225,14 @@ def _physics(named: Named, improved: Solution) -> Physics:
 
 
 def disturbance_note(view: View) -> list[str]:
-    """One line: the forces that no model predicts, where they are larger than their own smallest visible size."""
+    """One line: the remaining disturbance forces, where they are larger than their own smallest visible size."""
     layout, disturbance = view.vehicle.layout, view.disturbance
     total = np.asarray(view.followed.force).std(axis=(0, 1))
     # a mechanism's coordinate may be of any unit
     sized = lambda e, q: f"{float(q):.3g} {FORCE_UNITS.get(e, '')}".strip()
     said = [
-        f"{e} ({sized(e, q)}, {float(t):.2g} s)"
+        f"{e} {sized(e, q)}, {float(t):.2g} s"
         for e, q, t, rms in zip(layout.equations, disturbance.force, disturbance.time, total, strict=True)
         if rms > REPORTED_DISTURBANCE * float(q)
     ]
-    return [f"What is left looks like random forces in {', '.join(said)}."] if said else []
+    return [f"Random disturbance forces remain (standard deviation, correlation time): {'; '.join(said)}."] if said else []

@@ -1,4 +1,4 @@
-"""How much more probable one model is than another, as far as the recordings agree on it."""
+"""Log evidence of rival models that allows for both being wrong: by how much the blocks of the recordings differ."""
 
 from collections.abc import Sequence
 
@@ -11,8 +11,8 @@ from .cross_validation import Predicted
 _TINY = 1e-12
 
 
-def told_apart(evidence: Sequence[float], predicted: Sequence[Predicted]) -> list[float]:
-    r"""Log `evidence` of models, of which each is behind the best by as much as is `believed`.
+def robust_log_evidence(evidence: Sequence[float], predicted: Sequence[Predicted]) -> list[float]:
+    r"""Log `evidence` of models, with `robust_log_odds` between each and the best.
 
     The variance of a difference in log evidence is that of the sum of what each of n blocks of the training runs,
     `predicted` from the others, prefers the best by: $s^2 = n\,\mathrm{var}(t)$. A model that diverges has none.
@@ -25,11 +25,11 @@ def told_apart(evidence: Sequence[float], predicted: Sequence[Predicted]) -> lis
         blocks = predicted[best].one_step - one.one_step
         if np.isfinite(whole[i]) and np.all(np.isfinite(blocks)):
             variance = len(blocks) * float(np.var(blocks, ddof=1))
-            whole[i] = whole[best] - believed(whole[best] - whole[i], variance)
+            whole[i] = whole[best] - robust_log_odds(whole[best] - whole[i], variance)
     return whole.tolist()
 
 
-def believed(ahead: float, variance: float) -> float:
+def robust_log_odds(ahead: float, variance: float) -> float:
     r"""The log odds of two models, the one `ahead` by T ≥ 0 in log evidence, a sum whose variance is s².
 
     Where one of the two is right, the odds are $e^T$, and T is $\pm s^2/2 \pm s$. Where neither is, as of a drag of a

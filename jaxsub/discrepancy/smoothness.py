@@ -29,7 +29,7 @@ from .spline_basis import hat_functions
 
 # three knots between any two of `SmoothForce`
 FINE = 4 * (KNOTS - 1) + 1
-# s² in units of the one for which the best told shape has a prior as wide as its error
+# s² in units of the one for which the best identified shape has a prior as wide as its error
 _SIZES = np.geomspace(1e-2, 1e8, 61)
 _ROUNDING = 1e-8
 

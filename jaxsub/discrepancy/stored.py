@@ -28,8 +28,8 @@ _DAMAGED = (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.B
 def save_conclusions(conclusions: Conclusions, path: Path) -> None:
     """Write all but the vehicles that explain the recordings about as well."""
     arrays: list[np.ndarray] = []
-    told = _encoded(dataclasses.replace(conclusions, explanations=()), arrays)
-    text = json.dumps({"schema": _SCHEMA, _TEXT: told})
+    encoded = _encoded(dataclasses.replace(conclusions, explanations=()), arrays)
+    text = json.dumps({"schema": _SCHEMA, _TEXT: encoded})
     named = {f"array_{index}": array for index, array in enumerate(arrays)}
     np.savez_compressed(path, **{_TEXT: np.frombuffer(text.encode(), np.uint8)}, **named)  # pyright: ignore[reportArgumentType]
 

@@ -23,7 +23,7 @@ def summary(
     forces = [effect for effect in standing if isinstance(effect, SmoothForce)]
     described = [effect.label for effect in standing if effect not in forces]
     described += [f"a smooth force in {force.equation}" for force in forces]
-    added = f" {', '.join(described)} are surrogates for unknown physics, and claim no cause." if described else ""
+    added = f" Surrogates for unknown physics, which claim no cause: {', '.join(described)}." if described else ""
     said = [_verdict(verdict, physics, where, found, p_value) + added]
     if found is None:
         said.append("The test runs were not looked at yet.")

@@ -151,7 +151,7 @@ def test_a_twin_that_is_rejected_gives_way_to_the_next(monkeypatch):
     """Claim: the most probable that stands is taken, what was refused before is no rival, what is not told is one."""
     path = sys.modules["jaxsub.discrepancy.acceptance"]
     monkeypatch.setattr(path, "named_on", lambda *_: SimpleNamespace(collinear=[1, 2, 3]))
-    monkeypatch.setattr(path, "told_apart", lambda evidence, predicted: evidence)
+    monkeypatch.setattr(path, "robust_log_evidence", lambda evidence, predicted: evidence)
     untold = [(3, 31.0), (2, -np.inf)]
     assert accept_singly(Fitted(), [0]) == {}
     assert accept_singly(Fitted(1), [0]) == {1: [(1, 20.0), *untold]}

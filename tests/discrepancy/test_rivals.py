@@ -5,7 +5,7 @@ import pytest
 from scipy import special
 
 from jaxsub.discrepancy.cross_validation import Predicted
-from jaxsub.discrepancy.rivals import told_apart
+from jaxsub.discrepancy.rivals import robust_log_evidence
 
 BLOCKS = 48
 
@@ -37,7 +37,7 @@ def test_where_noise_is_all_that_errs_stated_probabilities_are_calibrated():
         first = rng.random() < 0.5
         sign = 1.0 if first else -1.0
         models = [model(np.ones(BLOCKS)), model(np.ones(BLOCKS) - sign * ahead)]
-        found = special.softmax(told_apart([0.0, -sign * float(ahead.sum())], models))
+        found = special.softmax(robust_log_evidence([0.0, -sign * float(ahead.sum())], models))
         stated.append(found.max())
         true.append((found[0] > 0.5) == first)
     stated, true = np.array(stated), np.array(true)
@@ -53,8 +53,8 @@ def test_where_parts_of_the_recordings_disagree_neither_is_certain():
     parts = rng.permutation(np.repeat([100.0, -88.0], BLOCKS // 2)) / (BLOCKS // 2)
     leader = model(np.ones(BLOCKS))
     agreed, differing = (leader, model(1.0 - exactly(rng, 12.0))), (leader, model(1.0 - parts))
-    alike = special.softmax(told_apart([0.0, -12.0], agreed))
-    apart = special.softmax(told_apart([0.0, -12.0], differing))
+    alike = special.softmax(robust_log_evidence([0.0, -12.0], agreed))
+    apart = special.softmax(robust_log_evidence([0.0, -12.0], differing))
     assert alike[0] > 0.99
     assert 0.5 < apart[0] < 0.75
 
@@ -63,14 +63,14 @@ def test_the_order_of_several_is_kept():
     """Claim: the evidence of fits orders them, the best keeps its own, and one alone does."""
     rng = np.random.default_rng(7)
     models = [model(1.0 - exactly(rng, 9.0)), model(np.ones(BLOCKS)), model(1.0 - exactly(rng, 30.0))]
-    found = told_apart([-9.0, 5.0, -30.0], models)
+    found = robust_log_evidence([-9.0, 5.0, -30.0], models)
     assert np.argsort(found).tolist() == [2, 0, 1]
     assert found[1] == 5.0
-    assert told_apart([5.0], [model(np.full(BLOCKS, 0.5))]) == [5.0]
+    assert robust_log_evidence([5.0], [model(np.full(BLOCKS, 0.5))]) == [5.0]
 
 
 def test_a_model_without_evidence_is_none():
     """Claim: beside one that has evidence it keeps none, and where all diverge they keep what they have."""
     fine = model(np.zeros(BLOCKS))
-    assert told_apart([-np.inf, 1.0], [fine, fine]) == [-np.inf, 1.0]
-    assert told_apart([-np.inf, -np.inf], [fine, fine]) == [-np.inf, -np.inf]
+    assert robust_log_evidence([-np.inf, 1.0], [fine, fine]) == [-np.inf, 1.0]
+    assert robust_log_evidence([-np.inf, -np.inf], [fine, fine]) == [-np.inf, -np.inf]
