@@ -100,7 +100,7 @@ def problem_and_case(samples: int = 800, runs: int = 3, free: int = 25) -> tuple
         np.asarray(stacked.outputs),
         np.asarray(sigma),
         np.asarray(problem.guess),
-        np.asarray(problem.spread),
+        np.asarray(problem.start_std),
         np.asarray(problem.prior_mean),
         np.asarray(problem.prior_std),
     )

@@ -132,14 +132,14 @@ def simulated(fit: Solution, blocks: int = BLOCKS, *, known_start: bool = False)
         return nowhere
     problem, free = fit.problem, len(fit.names)
     prior = np.diag(np.asarray(problem.prior_std, float) ** -2.0)
-    spread = np.zeros_like(problem.spread) if known_start else np.asarray(problem.spread)
+    start_std = np.zeros_like(problem.start_std) if known_start else np.asarray(problem.start_std)
     own = slice(1 + free, None)
-    scale = np.concatenate([np.ones(1 + free), spread])
+    scale = np.concatenate([np.ones(1 + free), start_std])
     products = products * scale[:, None] * scale
     # each run's initial state is optimal, and follows the other numbers by Y
     whole = products.sum(axis=1)
     try:
-        Y = np.linalg.solve(whole[:, own, own] + np.eye(len(spread)), whole[:, own, : 1 + free])
+        Y = np.linalg.solve(whole[:, own, own] + np.eye(len(start_std)), whole[:, own, : 1 + free])
     except np.linalg.LinAlgError:
         # products so large that adding one changes none of them are of a model that nearly diverges
         return nowhere

@@ -88,7 +88,7 @@ class InnovationSearch:
         """The innovations of a vehicle under a disturbance, and their sensitivities."""
         problem, names = self.problem, [row.name for row in vehicle.layout.free]
         disturbance = jax.tree.map(np.asarray, disturbance)
-        followed = filter_runs(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.spread)
+        followed = filter_runs(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.start_std)
         found = np.asarray(followed.products)[: 1 + len(names), : 1 + len(names)]
         length = root_or_one(np.diag(found)[1:])
         unit = np.concatenate([np.ones(1), length])
@@ -98,7 +98,7 @@ class InnovationSearch:
         prior = pulled.T @ pulled + np.diag([0.0, *[_UNIDENTIFIED] * len(names)])
         base = jax.tree.map(lambda a, b: np.concatenate([a, b], axis=-1) / unit, followed.residual, followed.theta)
         gram = found / np.outer(unit, unit) + prior
-        return Iterate(vehicle, disturbance, followed, base, prior, length, gram, float(followed.spread))
+        return Iterate(vehicle, disturbance, followed, base, prior, length, gram, float(followed.log_determinant))
 
     @quietly
     def scoring_step(self, iterate: Iterate) -> Iterate:

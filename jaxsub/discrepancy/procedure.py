@@ -235,4 +235,6 @@ def disturbance_note(view: View) -> list[str]:
         for e, q, t, rms in zip(layout.equations, disturbance.force, disturbance.time, total, strict=True)
         if rms > REPORTED_DISTURBANCE * float(q)
     ]
-    return [f"Random disturbance forces remain (standard deviation, correlation time): {'; '.join(said)}."] if said else []
+    return (
+        [f"Random disturbance forces remain (standard deviation, correlation time): {'; '.join(said)}."] if said else []
+    )

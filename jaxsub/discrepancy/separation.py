@@ -63,7 +63,7 @@ class Rivals(eqx.Module):
         return cls(
             tuple(models),
             tuple(problem.guess for problem in problems),
-            tuple(problem.spread for problem in problems),
+            tuple(problem.start_std for problem in problems),
             tuple(problem.prior_std for problem in problems),
             jnp.sqrt(jnp.mean(recorded.mask, axis=(0, 1))) / sigma,
             run,

@@ -105,7 +105,9 @@ class _Search:
             one, others = self._beside(best, every, one)
             tried = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
             tried = [(effect, model) for effect, model in tried if model.admissible] or tried[:1]
-            values = robust_log_evidence([-float(model.fit.cost) for _, model in tried], [m.predicted for _, m in tried])
+            values = robust_log_evidence(
+                [-float(model.fit.cost) for _, model in tried], [m.predicted for _, m in tried]
+            )
             fits = [(effect, model, value) for (effect, model), value in zip(tried, values, strict=True)]
             effect, model, _ = max(fits, key=lambda fit: (fit[1].significant, fit[2]))
             if model is best:

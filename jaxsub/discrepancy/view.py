@@ -115,7 +115,7 @@ def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVe
     problem, rms = with_wide_priors(fit.problem), fit.rms
     much = max(rms.values()) > LARGE_ERROR
     search = InnovationSearch(problem, problem.guess if much else fit.start)
-    guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.spread), noise=_white(fit))
+    guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.start_std), noise=_white(fit))
     vehicles = [fit.vehicle, *([near] if much and near is not None else [])]
     best = lambda pairs: by_cost(search.evaluate(*pair) for pair in pairs)[0]
     if disturbance is not None:
@@ -175,9 +175,9 @@ def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturb
 
 
 @compiled
-def _guessed(model: Linearised, runs: Runs, sigma: Array, spread: Array) -> Disturbance:
+def _guessed(model: Linearised, runs: Runs, sigma: Array, start_std: Array) -> Disturbance:
     """The first guess of the disturbance, by the residuals of a fit."""
-    return first_guess(System.of(model, runs, sigma, spread), model.error / sigma)
+    return first_guess(System.of(model, runs, sigma, start_std), model.error / sigma)
 
 
 def _white(fit: Solution) -> np.ndarray:
@@ -192,8 +192,8 @@ def _white(fit: Solution) -> np.ndarray:
 
 def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndarray, "r k n"]]:
     """The smoothed disturbance force (N, N m), which the model lacks, and its standard deviation."""
-    mean, spread = smoothed(view.disturbance, view.followed.system, _left(view))
-    return np.asarray(mean), np.asarray(spread)
+    mean, deviation = smoothed(view.disturbance, view.followed.system, _left(view))
+    return np.asarray(mean), np.asarray(deviation)
 
 
 def _left(view: View) -> Columns:

@@ -119,7 +119,7 @@ def run_variations(
     standard deviation between runs was not given.
     """
     vehicle, states = problem.vehicle, problem.vehicle.layout.states
-    gram, spread, p = np.asarray(products), np.asarray(problem.spread), len(problem.prior_mean)
+    gram, spread, p = np.asarray(products), np.asarray(problem.start_std), len(problem.prior_mean)
     free = [row.name for row in vehicle.layout.free]
     own = np.linalg.inv(gram[:, p:-1, p:-1] + np.eye(len(spread)))
     # how the initial states follow the coefficients
@@ -165,9 +165,9 @@ class Mixed:
     ) -> "Mixed":
         """About `vehicle` and its initial states `start`; `products` of its columns where they are there already."""
         if products is None:
-            found = summed_products(vehicle, problem.runs, start, problem.sigma, problem.spread)
+            found = summed_products(vehicle, problem.runs, start, problem.sigma, problem.start_std)
             products = np.asarray(found)
-        p, spread = len(problem.prior_mean), np.asarray(problem.spread)
+        p, spread = len(problem.prior_mean), np.asarray(problem.start_std)
         moved = np.asarray(start - problem.guess) / np.where(spread > 0.0, spread, 1.0)
         q = products.shape[-1]
         back = np.tile(np.eye(q), (len(moved), 1, 1))
@@ -225,6 +225,6 @@ def with_spreads(problem: Problem, spreads: Mapping[str, float]) -> Problem:
     vehicle = problem.vehicle.with_spreads(spreads)
     rows = vehicle.layout.deviations
     own = [float(vehicle.spreads[rows[s].name]) if s in rows else None for s in vehicle.layout.states]
-    now = np.asarray(problem.spread)
+    now = np.asarray(problem.start_std)
     spread = np.array([old if new is None else new for old, new in zip(now, own, strict=True)], float)
-    return dataclasses.replace(problem, vehicle=vehicle, spread=jax.device_put(spread))
+    return dataclasses.replace(problem, vehicle=vehicle, start_std=jax.device_put(spread))

@@ -307,7 +307,7 @@ def evaluate(ended: AbstractSearchEnd, watch: Watch = nobody) -> Solution:
     if isinstance(ended, Solution):
         return ended
     problem = ended.problem
-    model = BlockLinearised.of(ended.vehicle, ended.runs, ended.start, ended.sigma, problem.spread, watch)
+    model = BlockLinearised.of(ended.vehicle, ended.runs, ended.start, ended.sigma, problem.start_std, watch)
     covariance, gradient, pressed, result = _statistics(problem, model.products, ended.result)
     fields = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
     fields["result"] = result
@@ -379,7 +379,7 @@ def information_matrix(
     `BlockLinearised`.
     """
     p = len(problem.prior_mean)
-    own = products[:, p:-1, p:-1] + jnp.eye(len(problem.spread))
+    own = products[:, p:-1, p:-1] + jnp.eye(len(problem.start_std))
     mixed = products[:, :p, p:-1]
     gain = jnp.linalg.solve(own, jnp.swapaxes(mixed, 1, 2))
     information = jnp.sum(products[:, :p, :p] - mixed @ gain, 0) + jnp.diag(problem.prior_std**-2.0)

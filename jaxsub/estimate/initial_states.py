@@ -30,30 +30,30 @@ def initial_guess(vehicle: AbstractVehicle, runs: Runs) -> tuple[Float[Array, "r
     kept = memory_states(vehicle.effects)
     mask, outputs, times = np.asarray(runs.mask), _as_states(vehicle, runs), np.asarray(runs.times)
     guess = np.tile(_resting(vehicle), (len(times), 1))
-    spread = np.ones(len(layout.states))
+    start_std = np.ones(len(layout.states))
     deviations = layout.deviations
     for i, name in enumerate(layout.states):
         if name in deviations:
-            spread[i] = np.nan_to_num(np.asarray(vehicle.spreads[deviations[name].name]))
+            start_std[i] = np.nan_to_num(np.asarray(vehicle.spreads[deviations[name].name]))
             continue
-        spread[i] = _MEMORY if name in kept else _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
+        start_std[i] = _MEMORY if name in kept else _SPREAD.get(CHANNEL_UNITS.get(name, ""), 1.0)
         if name not in measured:
             if (coordinate := name.removesuffix("_rate")) in layout.channels:
-                spread[i] = max(spread[i], _fastest(runs, layout.channels.index(coordinate)))
+                start_std[i] = max(start_std[i], _fastest(runs, layout.channels.index(coordinate)))
             continue
         column = layout.channels.index(measured[name])
         # wide enough that the prior weighs nothing against the channel's own first samples
-        spread[i] = max(spread[i], _std(outputs[..., column][mask[..., column]]))
+        start_std[i] = max(start_std[i], _std(outputs[..., column][mask[..., column]]))
         for run, there in enumerate(mask[..., column]):
             if there.any():
                 guess[run, i] = outputs[run, there, column][0]
-                spread[i] = max(spread[i], _change(times[run, there], outputs[run, there, column]))
+                start_std[i] = max(start_std[i], _change(times[run, there], outputs[run, there, column]))
     if QUATERNION[0] in layout.states:
         rows = [layout.states.index(name) for name in QUATERNION]
         for run in range(len(guess)):
             guess[run, rows] = quaternion_of(_first_angles(layout, mask[run], outputs[run]))
-        spread[rows] = 0.5 * _SPREAD["rad"]
-    return tuple(jax.device_put((guess, spread)))
+        start_std[rows] = 0.5 * _SPREAD["rad"]
+    return tuple(jax.device_put((guess, start_std)))
 
 
 def rest(vehicle: AbstractVehicle, count: int) -> Float[Array, "r s"]:

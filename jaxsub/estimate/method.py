@@ -201,7 +201,7 @@ def lanes_for(problem: Problem) -> int:
 
 def bytes_of_a_lane(problem: Problem) -> int:
     """What one search takes at once: its whitened Jacobian, some copies of it."""
-    columns = len(problem.prior_mean) + len(problem.spread) + 1
+    columns = len(problem.prior_mean) + len(problem.start_std) + 1
     return 8 * _COPIES * problem.runs.outputs.size * columns
 
 

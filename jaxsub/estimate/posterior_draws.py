@@ -47,7 +47,7 @@ class Target(eqx.Module):
         """Of what `found` fitted. Raises InputError where the recordings leave a direction open."""
         problem = found.problem
         estimated = tuple(output.sigma is None for output in found.vehicle.layout.outputs)
-        moved = (found.start - problem.guess) / jnp.where(problem.spread > 0.0, problem.spread, 1.0)
+        moved = (found.start - problem.guess) / jnp.where(problem.start_std > 0.0, problem.start_std, 1.0)
         states = jnp.zeros(0) if found.known_start else moved.ravel()
         y = jnp.concatenate([problem.origin, states])
         information = _information(found, problem, estimated)
@@ -79,7 +79,7 @@ class Target(eqx.Module):
         y, sigma = self.split(at)
         p = len(self.problem.prior_mean)
         theta = self.problem.transform.to_physical(y[:p])
-        return theta, self.problem.guess + self.problem.spread * self.problem.moved(y), sigma
+        return theta, self.problem.guess + self.problem.start_std * self.problem.moved(y), sigma
 
     def _with(self, sigma: Array) -> Problem:
         return dataclasses.replace(self.problem, sigma=sigma)
@@ -95,7 +95,7 @@ def _information(found: Solution, problem: Problem, estimated: tuple[bool, ...])
     if found.known_start:
         return jax.scipy.linalg.block_diag(corner, noise)
     mixed = jnp.moveaxis(products[:, :p, p:-1] * slope[:, None], 0, 1).reshape(p, -1)
-    own = jax.scipy.linalg.block_diag(*(products[:, p:-1, p:-1] + jnp.eye(len(problem.spread))))
+    own = jax.scipy.linalg.block_diag(*(products[:, p:-1, p:-1] + jnp.eye(len(problem.start_std))))
     return jax.scipy.linalg.block_diag(jnp.block([[corner, mixed], [mixed.T, own]]), noise)
 
 

@@ -38,7 +38,7 @@ class Problem(eqx.Module):
     - `sigma`: (c,) noise of each channel, SI.
     - `transform`: of the free parameters; `origin`: (p,) the coordinates where they start, and stay where `moving` is
       false. `prior_mean`, `prior_std`: (p,), the latter infinite where there is none.
-    - `guess`, `spread`: (R, s) and (s,) Gaussian prior of the initial states; a known one has no spread.
+    - `guess`, `start_std`: (R, s) and (s,) Gaussian prior of the initial states; of a known one it is zero.
     - `known_start`: whether initial states are known, and no coordinates.
     - `march`: where there is one, cost and expansion come from compiled C, and have no further derivatives.
     """
@@ -52,7 +52,7 @@ class Problem(eqx.Module):
     prior_mean: Float[Array, " p"]
     prior_std: Float[Array, " p"]
     guess: Float[Array, "r s"]
-    spread: Float[Array, " s"]
+    start_std: Float[Array, " s"]
     known_start: bool = eqx.field(static=True)
     march: March | None = eqx.field(static=True, default=None)
 
@@ -80,7 +80,7 @@ class Problem(eqx.Module):
         # an effect without a prior starts at its fitted or predicted size, which is no prior knowledge
         known = lambda row: row.name in own or math.isfinite(row.prior_std)
         means = [row.prior_mean if known(row) else float(values[row.name]) for row in rows]
-        guess, spread = initial_guess(vehicle, runs)
+        guess, start_std = initial_guess(vehicle, runs)
         transform = Transform.of(rows, theta)
         # `jnp.asarray` would make a program of every shape
         arrays: dict[str, Any] = jax.device_put(
@@ -88,7 +88,7 @@ class Problem(eqx.Module):
                 "moving": np.broadcast_to(np.asarray(moving), (len(rows),)),
                 "prior_mean": np.array(means, float),
                 "prior_std": np.array([row.prior_std for row in rows], float),
-                "spread": np.zeros(len(spread)) if known_start else spread,
+                "start_std": np.zeros(len(start_std)) if known_start else start_std,
             }
         )
         return cls(
@@ -116,7 +116,7 @@ class Problem(eqx.Module):
     @compiled
     def split(self, y: Float[Array, " d"]) -> tuple[AbstractVehicle, Float[Array, "r s"]]:
         """The vehicle and the initial states that the coordinates `y` stand for."""
-        return self.vehicle_at(y[: len(self.prior_mean)]), self.guess + self.spread * self.moved(y)
+        return self.vehicle_at(y[: len(self.prior_mean)]), self.guess + self.start_std * self.moved(y)
 
     def vehicle_at(self, y: Float[Array, " p"]) -> AbstractVehicle:
         """The vehicle that the coordinates `y` of the parameters stand for."""
@@ -139,8 +139,8 @@ class Problem(eqx.Module):
         theta = jnp.array([values[row.name] for row in self.vehicle.layout.free])
         if self.known_start:
             return self.at(theta)
-        moved = (start - self.guess) / jnp.where(self.spread > 0.0, self.spread, 1.0)
-        return self.at(theta).at[len(theta) :].set(jnp.where(self.spread > 0.0, moved, 0.0).ravel())
+        moved = (start - self.guess) / jnp.where(self.start_std > 0.0, self.start_std, 1.0)
+        return self.at(theta).at[len(theta) :].set(jnp.where(self.start_std > 0.0, moved, 0.0).ravel())
 
     def at(self, theta: Float[Array, " p"]) -> Float[Array, " d"]:
         """The coordinates of the physical parameters `theta` and the guessed initial states."""
@@ -159,13 +159,13 @@ class Problem(eqx.Module):
 
     def residuals(self, y: Float[Array, " d"]) -> Float[Array, " m"]:
         """Whitened errors of the outputs at the coordinates `y` (d,), then of the priors."""
-        return jnp.concatenate([_outputs(self, y, jnp.zeros(len(self.spread))).ravel(), _prior(self, y)])
+        return jnp.concatenate([_outputs(self, y, jnp.zeros(len(self.start_std))).ravel(), _prior(self, y)])
 
     def cost(self, y: Float[Array, " d"]) -> Float[Array, ""]:
         r"""$\tfrac12\sum$ residuals² at the coordinates `y` (d,): minus the log-likelihood, up to its constant."""
         if self.march is None:
             return 0.5 * jnp.sum(self.residuals(y) ** 2)
-        start = self.guess + self.spread * self.moved(y)
+        start = self.guess + self.start_std * self.moved(y)
         squares = self.march.squares(self.vehicle_at, y[: len(self.prior_mean)], start, self.runs, self.sigma)
         return 0.5 * (jnp.sum(squares) + jnp.sum(_prior(self, y) ** 2))
 
@@ -176,7 +176,7 @@ class Problem(eqx.Module):
 
     def expansion(self, y: Float[Array, " d"], gram: Float[Array, "r q q"]) -> "Expansion":
         """`expand` by `gram` (R, q, q), the `products` at `y`."""
-        p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
+        p, s = len(self.prior_mean), 0 if self.known_start else len(self.start_std)
         prior, slopes = value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
         among = jnp.sum(gram[:, :p, :p], axis=0) + slopes.T @ slopes
         curvature = Arrow(among, gram[:, :p, p:-1], gram[:, p:-1, p:-1] + jnp.eye(s)) if s else among
@@ -191,11 +191,11 @@ class Problem(eqx.Module):
         Runs do not feel each other's initial states, so one tangent a state serves every run: p + s simulations instead
         of p + R s.
         """
-        p, s = len(self.prior_mean), 0 if self.known_start else len(self.spread)
-        still = jnp.zeros(len(self.spread))
+        p, s = len(self.prior_mean), 0 if self.known_start else len(self.start_std)
+        still = jnp.zeros(len(self.start_std))
         if self.march is not None:
-            start = self.guess + self.spread * self.moved(y)
-            return self.march.products(self.vehicle_at, y[:p], start, self.spread, self.runs, self.sigma)
+            start = self.guess + self.start_std * self.moved(y)
+            return self.march.products(self.vehicle_at, y[:p], start, self.start_std, self.runs, self.sigma)
 
         def shown(change: Array) -> Array:
             return _outputs(self, y.at[:p].add(change[:p]), still.at[:s].add(change[p:]))
@@ -213,7 +213,7 @@ class Problem(eqx.Module):
         vehicle, start, scale = _split(self, y)
         # by NumPy, for which no program has to be made
         scale = np.asarray(scale)
-        gram = np.asarray(summed_products(vehicle, self.runs, start, self.sigma, self.spread, watch))
+        gram = np.asarray(summed_products(vehicle, self.runs, start, self.sigma, self.start_std, watch))
         p, q = len(self.prior_mean), len(scale)
         kept = np.array([*range(p), q - 1]) if self.known_start else np.arange(q)
         return jax.device_put((scale[:, None] * gram * scale)[:, kept[:, None], kept])
@@ -248,7 +248,7 @@ class Expansion(eqx.Module):
 def _outputs(problem: Problem, y: Array, moved: Array) -> Float[Array, "r k c"]:
     """Whitened errors at `y`, the initial states of all runs moved by the same `moved` (in their spreads)."""
     vehicle, start = problem.split(y)
-    return errors(vehicle, problem.runs, start + problem.spread * moved) / problem.sigma
+    return errors(vehicle, problem.runs, start + problem.start_std * moved) / problem.sigma
 
 
 @compiled
@@ -256,7 +256,7 @@ def _split(problem: Problem, y: Array) -> tuple[AbstractVehicle, Array, Float[Ar
     """Vehicle and initial states at `y`; and the errors' columns by it, in those of the outputs by physical values."""
     p = len(problem.prior_mean)
     _, slope = jax.jvp(problem.transform.to_physical, (y[:p],), (jnp.ones(p, y.dtype),))
-    scale = jnp.concatenate([-jnp.where(problem.moving, slope, 0.0), -jnp.ones_like(problem.spread), jnp.ones(1)])
+    scale = jnp.concatenate([-jnp.where(problem.moving, slope, 0.0), -jnp.ones_like(problem.start_std), jnp.ones(1)])
     return *problem.split(y), scale
 
 

@@ -56,7 +56,7 @@ def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, w
     reduced = _reduced(problem, model.products, np.asarray(fit.pressed) != 0.0)
     if disturbance is None:
         disturbance = residual_disturbance(problem, model, reduced.directions, lambda share: watch(0.5 * share))
-    adjoint = Adjoint.at_end(len(problem.guess), len(problem.spread), len(disturbance.force), len(fit.names))
+    adjoint = Adjoint.at_end(len(problem.guess), len(problem.start_std), len(disturbance.force), len(fit.names))
     for index in reversed(range(len(model))):
         adjoint = _back(problem, *model[index], reduced, disturbance, adjoint)
         watch(1.0 - 0.5 * index / len(model))
@@ -112,7 +112,7 @@ def _back(
 ) -> Adjoint:
     """The adjoint recursion of the scores' covariance through one block."""
     theta, start, _ = whitened_columns(problem, runs, model)
-    system = System.of(model, runs, problem.sigma, problem.spread)
+    system = System.of(model, runs, problem.sigma, problem.start_std)
     left = jnp.where(reduced.directions.held, 0.0, theta) - start @ reduced.gain[:, None]
     return carried_back(disturbance, system, left, after)
 

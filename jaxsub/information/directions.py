@@ -141,7 +141,7 @@ def _triangle(problem: Problem, model: BlockLinearised, watch: Watch) -> Float[n
     By decompositions of blocks and of what they leave: products would lose half the digits. The prior of the initial
     states is another block.
     """
-    p, s = len(problem.prior_mean), len(problem.spread)
+    p, s = len(problem.prior_mean), len(problem.start_std)
     left = np.zeros((len(problem.runs.times), 0, s + p))
     for index in range(len(model)):
         left = _upper(np.concatenate([left, _block_triangle(problem, *model[index])], axis=1))

@@ -75,7 +75,7 @@ def profile(fit: Solution, names: Sequence[str], *, points: int = 13, width: flo
 def _coordinates(fit: Solution, problem: Problem, theta: np.ndarray) -> Float[Array, "g d"]:
     """Coordinates of the coefficients `theta` (g, p) and the fitted initial states."""
     # initial states that are known have no spread, and no coordinates
-    moved = (fit.start - problem.guess) / jnp.where(problem.spread > 0.0, problem.spread, 1.0)
+    moved = (fit.start - problem.guess) / jnp.where(problem.start_std > 0.0, problem.start_std, 1.0)
     states = problem.coordinates()[theta.shape[1] :]
     rows = jax.vmap(problem.at)(jnp.asarray(theta))
     return rows.at[:, theta.shape[1] :].set(moved.ravel()[: states.size])

@@ -117,7 +117,7 @@ def _residual_and_columns(
     """The linearised system, and the residual beside the columns along the `basis`."""
     theta, _, residual = whitened_columns(problem, runs, model)
     theta = jnp.where(directions.held, 0.0, theta) @ directions.basis
-    system = System.of(model, runs, problem.sigma, problem.spread)
+    system = System.of(model, runs, problem.sigma, problem.start_std)
     return system, jnp.concatenate([residual[..., None], theta], axis=-1)
 
 
@@ -130,4 +130,4 @@ def whitened_columns(problem: Problem, runs: Runs, model: Linearised) -> tuple[A
     """Whitened sensitivities to the coefficients (physical) and to the initial states (in their spreads); residuals."""
     weight = runs.mask / problem.sigma
     theta = model.theta * weight[..., None]
-    return theta, model.start * weight[..., None] * problem.spread, model.error / problem.sigma
+    return theta, model.start * weight[..., None] * problem.start_std, model.error / problem.sigma

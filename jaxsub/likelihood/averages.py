@@ -48,7 +48,7 @@ class Averages(eqx.Module):
         ends = lambda arrays: along([arrays[0][:, :1], *(array[:, 1:] for array in arrays)])
         between = {name: along([getattr(one, name) for one in systems]) for name in ("A", "G", "intervals")}
         at = {name: ends([getattr(one, name) for one in systems]) for name in ("C", "measured")}
-        system = System(**jax.device_put(between | at | {"spread": systems[0].spread}))
+        system = System(**jax.device_put(between | at | {"start_std": systems[0].start_std}))
         whole = float(np.sum(between["intervals"]))
         interval, duration = whole / samples, whole / int(np.sum(between["intervals"] > 0.0))
         return cls(system, Columns(jnp.asarray(ends(shown))), jnp.asarray(interval), jnp.asarray(duration))
@@ -94,6 +94,6 @@ def group_means(system: System, shown: Float[Array, "r k c q"], groups: int) -> 
     A = jnp.concatenate([both[..., :s], jnp.zeros((r, groups, s + c, c))], axis=-1)
     measured = jnp.pad(back(count > 0), [(0, 0), (1, 0), (0, 0)])
     seen = jnp.concatenate([jnp.zeros((c, s)), jnp.eye(c)], axis=1) * measured[..., None]
-    spread = jnp.concatenate([system.spread, jnp.zeros(c)])
+    start_std = jnp.concatenate([system.start_std, jnp.zeros(c)])
     shown = jnp.pad(back(weight * jnp.sum(grouped(shown), axis=1)), [(0, 0), (1, 0), (0, 0), (0, 0)])
-    return System(A, both[..., s:], seen, measured, back(ends[:, -1]), spread), shown
+    return System(A, both[..., s:], seen, measured, back(ends[:, -1]), start_std), shown

@@ -44,9 +44,9 @@ class BlockLinearised(eqx.Module):
 
     **Fields**
 
-    - `vehicle`, `runs`: the model and the runs. `sigma`: (c,) noise, `spread`: (s,) of the initial states, both SI.
+    - `vehicle`, `runs`: the model and the runs. `sigma`: (c,) noise, `start_std`: (s,) of the initial states, both SI.
     - `products`: (R, q, q) of each run's whitened columns: by the p free parameters, by its initial state in its
-      `spread`, and the error.
+      `start_std`, and the error.
     - `error`: (R, K, c) measured minus modelled, SI, zero where missing.
     - `begins`: the B checkpoints. `only`: the linearised model where there is one block.
     - `length`: intervals in a block.
@@ -55,7 +55,7 @@ class BlockLinearised(eqx.Module):
     vehicle: AbstractVehicle
     runs: Runs
     sigma: Float[Array, " c"]
-    spread: Float[Array, " s"]
+    start_std: Float[Array, " s"]
     products: Float[Array, "r q q"]
     error: Float[Array, "r k c"]
     begins: tuple[Checkpoint, ...]
@@ -69,16 +69,16 @@ class BlockLinearised(eqx.Module):
         runs: Runs,
         start: Float[Array, "r s"],
         sigma: Float[Array, " c"],
-        spread: Float[Array, " s"],
+        start_std: Float[Array, " s"],
         watch: Watch = nobody,
     ) -> "BlockLinearised":
         """`vehicle` linearised along its trajectory over `runs` from the initial states `start` (R, s), SI.
 
-        `sigma` (c,) is the noise of the channels and `spread` (s,) the prior standard deviation of the initial states,
-        SI. `watch` is called with the share of the samples that is done.
+        `sigma` (c,) is the noise of the channels and `start_std` (s,) the prior deviation of initial states, both SI.
+        `watch` is called with the share of the samples that is done.
         """
         length, begins, errors, summed, only = block_length(vehicle, runs), [], [], [], None
-        for at, model, products in _passed(vehicle, runs, start, sigma, spread, watch):
+        for at, model, products in _passed(vehicle, runs, start, sigma, start_std, watch):
             begins.append(at)
             summed.append(products)
             errors.append(model.error)
@@ -87,7 +87,7 @@ class BlockLinearised(eqx.Module):
             vehicle,
             runs,
             sigma,
-            spread,
+            start_std,
             jax.device_put(np.sum(summed, axis=0)),
             _joined(errors, runs.times.shape[1], length),
             tuple(begins),
@@ -104,7 +104,7 @@ class BlockLinearised(eqx.Module):
         if self.only is not None:
             return self.runs, self.only
         block = _cut(self.runs, jnp.asarray(range(len(self))[index] * self.length), self.length)
-        return block, _block(self.vehicle, block, self.begins[index], self.sigma, self.spread)[0]
+        return block, _block(self.vehicle, block, self.begins[index], self.sigma, self.start_std)[0]
 
     def window(self, first: int, chosen: Int[np.ndarray, " m"], samples: int) -> tuple[Runs, Linearised]:
         """`samples` samples of the runs numbered `chosen`, from where the block numbered `first` begins."""
@@ -129,21 +129,21 @@ def summed_products(
     runs: Runs,
     start: Float[Array, "r s"],
     sigma: Float[Array, " c"],
-    spread: Float[Array, " s"],
+    start_std: Float[Array, " s"],
     watch: Watch = nobody,
 ) -> Float[Array, "r q q"]:
     """The `products` of `BlockLinearised` alone."""
-    passed = _passed(vehicle, runs, start, sigma, spread, watch)
+    passed = _passed(vehicle, runs, start, sigma, start_std, watch)
     return jax.device_put(np.sum([products for _, _, products in passed], axis=0))
 
 
 def _passed(
-    vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Array, spread: Array, watch: Watch
+    vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Array, start_std: Array, watch: Watch
 ) -> Iterator[tuple[Checkpoint, Linearised, np.ndarray]]:
     """Where each block begins, the model linearised along it, and the products of its whitened columns."""
     at = Checkpoint.at_start(vehicle, start)
     for block in _blocks(runs, block_length(vehicle, runs), watch):
-        model, products, after = _block(vehicle, block, at, sigma, spread)
+        model, products, after = _block(vehicle, block, at, sigma, start_std)
         yield at, model, np.asarray(products)
         at = after
 
@@ -162,10 +162,10 @@ def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s
 
 
 def _block(
-    vehicle: AbstractVehicle, runs: Runs, at: Checkpoint, sigma: Array, spread: Array
+    vehicle: AbstractVehicle, runs: Runs, at: Checkpoint, sigma: Array, start_std: Array
 ) -> tuple[Linearised, Array, Checkpoint]:
     """The model linearised along a block, the products of its whitened columns, and where the next block begins."""
-    return _summed(vehicle.turning, runs, at, *with_jacobians(vehicle, runs, at), sigma, spread)
+    return _summed(vehicle.turning, runs, at, *with_jacobians(vehicle, runs, at), sigma, start_std)
 
 
 @compiled
@@ -176,11 +176,11 @@ def _summed(
     states: Array,
     by: Jacobians,
     sigma: Array,
-    spread: Array,
+    start_std: Array,
 ) -> tuple[Linearised, Array, Checkpoint]:
     model, after = along(turning, runs, at, states, by)
     weight = (runs.mask / sigma)[..., None]
-    columns = [model.theta * weight, model.start * weight * spread, model.error[..., None] * weight]
+    columns = [model.theta * weight, model.start * weight * start_std, model.error[..., None] * weight]
     every = jnp.concatenate(columns, axis=-1)
     return model, jnp.einsum("rkca,rkcb->rab", every, every), after
 

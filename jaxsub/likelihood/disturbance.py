@@ -52,7 +52,7 @@ class System(eqx.Module):
 
     - `A`: (R, K-1, s, s) of the step by the state. `G`: (R, K-1, s, 2n) by a force at its start and end.
     - `C`: (R, K, c, s) of the channels by the state, zero where nothing was measured; `measured`: (R, K, c).
-    - `intervals`: (R, K-1) s, 0 where padded. `spread`: (s,) prior standard deviation of the initial states.
+    - `intervals`: (R, K-1) s, 0 where padded. `start_std`: (s,) prior standard deviation of the initial states.
     """
 
     A: Float[Array, "r k1 s s"]
@@ -60,19 +60,19 @@ class System(eqx.Module):
     C: Float[Array, "r k c s"]
     measured: Bool[Array, "r k c"]
     intervals: Float[Array, "r k1"]
-    spread: Float[Array, " s"]
+    start_std: Float[Array, " s"]
 
     @classmethod
     def of(
-        cls, model: Linearised | Jacobians, runs: Runs, sigma: Float[Array, " c"], spread: Float[Array, " s"]
+        cls, model: Linearised | Jacobians, runs: Runs, sigma: Float[Array, " c"], start_std: Float[Array, " s"]
     ) -> "System":
         """A linearised `model` on `runs`, its channels in units of `sigma` (c,), SI.
 
-        `spread` (s,) is the prior standard deviation of the initial states, SI.
+        `start_std` (s,) is the prior standard deviation of the initial states, SI.
         """
         C = model.C * (runs.mask / sigma)[..., None]
         intervals = jnp.where(runs.live, runs.steps[runs.step_of], 0.0)
-        return cls(model.A, model.G, C, runs.mask, intervals, spread)
+        return cls(model.A, model.G, C, runs.mask, intervals, start_std)
 
 
 class Columns(eqx.Module):
@@ -118,15 +118,15 @@ def first_guess(system: System, residual: Float[Array, "r k c"]) -> Disturbance:
     return Disturbance(force, jnp.full(n, slow), jnp.ones(residual.shape[2]))
 
 
-def restricted(gram: Float[Array, "q q"], spread: Float[Array, ""]) -> Float[Array, ""]:
+def restricted(gram: Float[Array, "q q"], log_determinant: Float[Array, ""]) -> Float[Array, ""]:
     """Minus the logarithm of the restricted likelihood, up to its constant.
 
     `gram` (q, q) has the products of the whitened residual and of the columns that are fitted to it, those of their
-    priors included; `spread` is half the log-determinant of the residual's covariance.
+    priors included; `log_determinant` is half the log-determinant of the residual's covariance.
     """
     among = jnp.linalg.cholesky(gram[1:, 1:])
     explained = solve_triangular(among, gram[1:, 0], lower=True)
-    return spread + jnp.sum(jnp.log(jnp.diagonal(among))) + 0.5 * (gram[0, 0] - explained @ explained)
+    return log_determinant + jnp.sum(jnp.log(jnp.diagonal(among))) + 0.5 * (gram[0, 0] - explained @ explained)
 
 
 @compiled
@@ -186,7 +186,7 @@ def steps(disturbance: Disturbance, system: System, columns: Columns) -> tuple[S
     """What a filter of the disturbed system needs at each sample, and the covariance of [x, d] that it begins with."""
     F, B = transition(disturbance, system)
     noise = jnp.where(system.measured, disturbance.noise, 1.0) ** 2
-    begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
+    begin = jnp.diag(jnp.concatenate([system.start_std, disturbance.force]) ** 2)
     return Steps(beyond(F), beyond(B), system.C, noise, columns.shown, columns.forcing), begin
 
 
@@ -367,11 +367,11 @@ def smoothed(
         m, P, information, pull, left, F = kept
         through = left.T @ F.T
         lever, weight = through @ lever - pull, information + through @ weight @ through.T
-        mean, spread = m - P @ lever, jnp.diag(P - P @ weight @ P)
-        return (lever, weight), (mean[s:], jnp.sqrt(jnp.maximum(spread[s:], 0.0)))
+        mean, variance = m - P @ lever, jnp.diag(P - P @ weight @ P)
+        return (lever, weight), (mean[s:], jnp.sqrt(jnp.maximum(variance[s:], 0.0)))
 
     def run(*samples: Values) -> tuple[Array, Array]:
-        begin = jnp.diag(jnp.concatenate([system.spread, disturbance.force]) ** 2)
+        begin = jnp.diag(jnp.concatenate([system.start_std, disturbance.force]) ** 2)
         _, kept = jax.lax.scan(forth, (jnp.zeros(s + n), begin), samples)
         nothing = jnp.zeros(s + n), jnp.zeros((s + n, s + n))
         return jax.lax.scan(back, nothing, kept, reverse=True)[1]

@@ -178,15 +178,15 @@ def innovation_products(steps: Steps, begin: Float[Array, "z z"]) -> tuple[Float
 
 
 def _forth(steps: Steps, begin: Array) -> tuple[tuple[Array, Array], tuple[Steps, tuple[Array, Array]]]:
-    gram, spread, begun = _filtered(steps, begin, 1)
+    gram, log_determinant, begun = _filtered(steps, begin, 1)
     first = jax.tree.map(lambda M: M[:, 0], begun)
-    return (jnp.sum(gram, (0, 1)), jnp.sum(spread)), (steps, first)
+    return (jnp.sum(gram, (0, 1)), jnp.sum(log_determinant)), (steps, first)
 
 
 def _back(kept: tuple[Steps, tuple[Array, Array]], given: tuple[Array, Array]) -> tuple[Steps, Array]:
     """The adjoint, piece by piece from the last: what a piece met is worked out again from where it begins."""
     steps, begun = kept
-    both, spread = given[0] + given[0].T, given[1]
+    both, log_determinant = given[0] + given[0].T, given[1]
     runs, samples, (z, q) = *steps.noise.shape[:2], begun[1].shape[-2:]
     pieces, length = _cut(samples, 1)
 
@@ -198,7 +198,7 @@ def _back(kept: tuple[Steps, tuple[Array, Array]], given: tuple[Array, Array]) -
             at = jax.vmap(lambda k: _sample(steps, run, k))(first + jnp.arange(length))
             passed = jax.lax.scan(_met, before, at)[1]
             return jax.lax.scan(
-                lambda carry, each: _back_step(carry, *each, both, spread),
+                lambda carry, each: _back_step(carry, *each, both, log_determinant),
                 after,
                 (at, passed, *_solved(passed)),
                 reverse=True,
@@ -232,7 +232,7 @@ def _back_step(
     gain: Array,
     inverse: Array,
     both: Array,
-    spread: Array,
+    log_determinant: Array,
 ) -> tuple[tuple[Array, Array], Steps]:
     """The adjoints before a sample by those after it, and the derivatives by what the filter needs there."""
     lever, weight = carry
@@ -246,7 +246,7 @@ def _back_step(
     pull = u @ both
     of_E = weighted + pull
     mixed = (weighted + 0.5 * pull) @ u.T
-    of_S = kept @ gain.T - 0.5 * (mixed + mixed.T) + 0.5 * spread * inverse
+    of_S = kept @ gain.T - 0.5 * (mixed + mixed.T) + 0.5 * log_determinant * inverse
     of_across = (u @ left.T - 2.0 * kept).at[:, :s].add(of_S @ at.C)
     across = passed.factor @ passed.half
     of_C = of_across @ passed.P[:s].T + of_S @ across[:, :s] - of_E @ passed.X[:s].T

@@ -37,7 +37,7 @@ class FilteredRuns(eqx.Module):
     - `residual`: one column, the measured outputs less those expected, and the filter's corrections of the path.
     - `theta`: p columns, by the free parameters.
     - `products`: (w, w) of the residual and `theta`, whitened under the disturbance, and zeros up to the width w of a
-      program; `spread`: half the log-determinant of the residual's covariance.
+      program; `log_determinant`: half that of the residual's covariance.
     """
 
     expected: Float[Array, "r k s"]
@@ -47,7 +47,7 @@ class FilteredRuns(eqx.Module):
     residual: Columns
     theta: Columns
     products: Float[Array, "w w"]
-    spread: Float[Array, ""]
+    log_determinant: Float[Array, ""]
 
 
 def filter_runs(
@@ -56,16 +56,16 @@ def filter_runs(
     sigma: Float[Array, " c"],
     disturbance: Disturbance,
     start: Float[Array, "r s"],
-    spread: Float[Array, " s"],
+    start_std: Float[Array, " s"],
 ) -> FilteredRuns:
-    """`vehicle` filtered along `runs`, from initial states of mean `start` (R, s) and standard deviation `spread` (s,).
+    """`vehicle` filtered along `runs`, from initial states of mean `start` (R, s), standard deviation `start_std` (s,).
 
     Both are SI. `sigma` (c,) is the noise of the channels, SI, in whose units the columns are, and `disturbance` that
     of the forces.
     """
-    expected, filtered, force, push = _path(vehicle, runs, sigma, disturbance, start, spread)
+    expected, filtered, force, push = _path(vehicle, runs, sigma, disturbance, start, start_std)
     by = jacobians(vehicle, runs, filtered, expected, push)
-    system, residual, theta, whole = _columns(vehicle.turning, runs, sigma, spread, expected, filtered, push, by)
+    system, residual, theta, whole = _columns(vehicle.turning, runs, sigma, start_std, expected, filtered, push, by)
     products, logarithm = total_products(disturbance, system, whole)
     return FilteredRuns(expected, filtered, force, system, residual, theta, products, logarithm)
 
@@ -75,7 +75,7 @@ def _columns(
     turning: tuple[bool, ...],
     runs: Runs,
     sigma: Array,
-    spread: Array,
+    start_std: Array,
     expected: Array,
     filtered: Array,
     push: Array,
@@ -90,12 +90,12 @@ def _columns(
     theta = Columns(jnp.where(runs.mask[..., None], by.direct / sigma[:, None], 0.0), by.F)
     whole = residual + theta
     whole = whole.padded(padded_width(whole.shown.shape[-1]))
-    return System.of(by, runs, sigma, spread), residual, theta, whole
+    return System.of(by, runs, sigma, start_std), residual, theta, whole
 
 
 @compiled
 def _path(
-    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, spread: Array
+    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, start_std: Array
 ) -> tuple[Float[Array, "r k s"], Float[Array, "r k s"], Float[Array, "r k n"], Float[Array, "r k1 2 n"]]:
     """Expected and filtered states, filtered forces, and the force at both ends of each interval."""
     vehicle, outputs = _prompt(vehicle, runs)
@@ -138,7 +138,7 @@ def _path(
         # an interval after the last sample, so that one loop serves all; it leads nowhere
         moving = tuple(jnp.concatenate([a, a[-1:]]) for a in moving)
         m = jnp.concatenate([begin, jnp.zeros(n)])
-        P = jnp.diag(jnp.concatenate([spread, disturbance.force]) ** 2)
+        P = jnp.diag(jnp.concatenate([start_std, disturbance.force]) ** 2)
         return jax.lax.scan(advance, (m, P), (seen, moving))[1]
 
     seen = (runs.times, runs.signals, outputs, runs.mask)

@@ -73,16 +73,16 @@ class March:
         vehicle_at: VehicleAt,
         y: Float[Array, " p"],
         start: Float[Array, "r s"],
-        spread: Float[Array, " s"],
+        start_std: Float[Array, " s"],
         runs: Runs,
         sigma: Array,
     ) -> Float[Array, "r q q"]:
-        """Products of each run's whitened columns: by the coordinates, by its start in its `spread`, and the error."""
+        """Products of each run's whitened columns: by the coordinates, by its start over `start_std`, and the error."""
         given = functools.partial(self._given, vehicle_at)
         along = lambda tangent: jax.jvp(given, (y,), (tangent,))
         value, slope = jax.vmap(along, out_axes=(None, -1))(jnp.eye(y.size, dtype=y.dtype))
         rows = (*value, start, slope[0][self._by_others], slope[1])
-        return self._products(_members(rows), _seen(runs, sigma), (*self._same(runs), spread))[0]
+        return self._products(_members(rows), _seen(runs, sigma), (*self._same(runs), start_std))[0]
 
     def _given(self, vehicle_at: VehicleAt, y: Array) -> tuple[Array, Array]:
         """The numbers that the coordinates move but the weights, and the linear part that these are of."""
@@ -97,13 +97,13 @@ class March:
 
     def _call(self, what: str, rows: tuple[Array, ...], seen: Array, same: tuple[Array, ...]) -> Array:
         other, linear, start, *slopes = rows
-        nodes, h, *spread = same
+        nodes, h, *start_std = same
         shape = start.shape[:2]
         if what == "products":
             width = slopes[1].shape[-1] + (start.shape[-1] if self._start else 0) + 1
             shape = (*shape, width, width)
         like = jax.ShapeDtypeStruct(shape, start.dtype)
-        arrays = (other, linear, start, nodes, seen, h, *slopes, *spread)
+        arrays = (other, linear, start, nodes, seen, h, *slopes, *start_std)
         return jax.ffi.ffi_call(self._targets[what], like)(*arrays)
 
 

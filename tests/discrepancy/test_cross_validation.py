@@ -120,7 +120,7 @@ def test_a_block_of_a_simulation_has_the_errors_of_a_fit_to_the_others():
     whole = fitted()
     found = simulated(whole, 4)
     model, weight = whole.model.whole, np.asarray(whole.runs.mask) / np.asarray(whole.sigma)
-    spread = np.asarray(whole.problem.spread)
+    spread = np.asarray(whole.problem.start_std)
     error, theta, start = (np.asarray(part) for part in (model.error, model.theta, model.start))
     theta, start = theta * weight[..., None], start * weight[..., None] * spread
     error, samples = error * weight, 1 + np.asarray(whole.runs.live).sum(1)
@@ -143,7 +143,7 @@ def test_a_vehicle_that_runs_away_is_predicted_nowhere():
     """Claim: a model that diverges along the training runs has no density in any block, and no NaN."""
     whole = fitted()
     away = whole.vehicle.with_values({"D_x": jnp.asarray(-1e3)})
-    model = BlockLinearised.of(away, whole.runs, whole.start, whole.sigma, whole.problem.spread)
+    model = BlockLinearised.of(away, whole.runs, whole.start, whole.sigma, whole.problem.start_std)
     assert not bool(jnp.all(jnp.isfinite(model.error)))
     assert np.all(np.isneginf(simulated(dataclasses.replace(whole, vehicle=away, model=model))))
 

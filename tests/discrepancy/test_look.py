@@ -51,7 +51,7 @@ def test_runs_of_unequal_length_have_a_disturbance(fitted):
     assert evidence_of(same) == pytest.approx(evidence_of(found), rel=1e-6)
     assert np.asarray(same.disturbance.force) == pytest.approx(np.asarray(found.disturbance.force), rel=1e-3)
     # it moved from where it began
-    begun = view._guessed(fitted.model.whole, fitted.runs, fitted.sigma, fitted.problem.spread)
+    begun = view._guessed(fitted.model.whole, fitted.runs, fitted.sigma, fitted.problem.start_std)
     assert np.max(np.abs(np.log(found.disturbance.force / np.asarray(begun.force)))) > 0.1
 
 

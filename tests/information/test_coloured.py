@@ -106,7 +106,7 @@ def dense():
         C=jnp.asarray(rng.standard_normal((1, K, c, s))),
         measured=jnp.ones((1, K, c), bool),
         intervals=jnp.asarray(rng.uniform(0.1, 0.5, (1, K - 1))),
-        spread=jnp.asarray(rng.uniform(0.1, 2.0, s)),
+        start_std=jnp.asarray(rng.uniform(0.1, 2.0, s)),
     )
     disturbance = Disturbance(jnp.array([0.7, 1.3]), jnp.array([0.4, 2.0]), jnp.array([0.5, 1.1]))
     return data, disturbance, *written_out(data, disturbance)
@@ -131,7 +131,7 @@ def written_out(data, disturbance):
             origin.append(A[k] @ origin[-1])
     covariance = np.einsum("kcin,ijn,ldjn->kcld", answer, forces, answer).reshape(K * c, K * c)
     covariance += np.diag(np.tile(np.asarray(disturbance.noise) ** 2, K))
-    begun = np.stack([C[k] @ origin[k] for k in range(K)]).reshape(K * c, s) * np.asarray(data.spread)
+    begun = np.stack([C[k] @ origin[k] for k in range(K)]).reshape(K * c, s) * np.asarray(data.start_std)
     return covariance, covariance + begun @ begun.T
 
 
@@ -161,7 +161,7 @@ def minus_log(disturbance, system, columns, prior):
 
 def posed(fit, residual):
     """What `estimate_disturbance` takes but for its start, of residuals (R, K, c)."""
-    system = System.of(fit.model.whole, fit.runs, fit.sigma, fit.problem.spread)
+    system = System.of(fit.model.whole, fit.runs, fit.sigma, fit.problem.start_std)
     shown = np.concatenate([residual[..., None], np.asarray(fit.model.whole.theta)], axis=-1)
     weight = np.asarray(fit.runs.mask)[..., None] / SIGMA[:, None]
     return system, Columns(jnp.asarray(shown * weight)), 1e-6 * jnp.eye(shown.shape[-1])

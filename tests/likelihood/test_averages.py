@@ -25,7 +25,7 @@ def system():
         C=jnp.asarray(rng.standard_normal((RUNS, SAMPLES, CHANNELS, STATES)) * measured[..., None]),
         measured=jnp.asarray(measured),
         intervals=jnp.asarray(rng.uniform(0.1, 0.5, (RUNS, SAMPLES - 1))),
-        spread=jnp.ones(STATES),
+        start_std=jnp.ones(STATES),
     )
 
 
