@@ -19,6 +19,7 @@ from .base import (
     numbers,
     options,
     parameter_table,
+    shape,
     stacked,
     with_numbers,
 )
@@ -133,6 +134,7 @@ __all__ = [
     "numbers",
     "options",
     "parameter_table",
+    "shape",
     "stacked",
     "variables",
     "velocities",

@@ -26,7 +26,10 @@ def amplitude(unit: str, sign: int = 0, default: float = 0.0, most: float = math
 
 
 def shape(unit: str, sign: int = 0, default: float = 0.0) -> Any:
-    """A field that the effect is not linear in, such as a time constant; candidates lie on a grid of it."""
+    """A field in `unit` that the effect is not linear in, such as a time constant; candidates lie on a grid of it.
+
+    `sign` and `default` are as of `amplitude`.
+    """
     return _field("shape", unit, sign, default)
 
 

@@ -120,7 +120,7 @@ def test_the_kind_of_mismatch_is_said():
     """Claim: every kind has its probability; nothing is said where nothing was asked."""
     text = Outline(render(diagnosis("named"), VEHICLE, {})).text.replace("\u202f", " ")
     assert "the vehicle’s structure97 %" in text and "a sensor< 0.1 %" in text
-    assert "by what was accepted" in text
+    assert "by the accepted effects and their rivals" in text
     assert "before anything is named" in render(diagnosis("unknown"), VEHICLE, {})
     assert "What kind" not in render(bare(), VEHICLE, {})
 

@@ -4,7 +4,6 @@ import json
 import re
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from ...errors import InputError
 from ...recording import Recording
@@ -66,6 +65,8 @@ def _regressed(log: Recording, q: str, drives: list[str]) -> dict[str, float]:
 
     **Raises** `InputError` for a log with fewer samples of it than local polynomials need.
     """
+    from scipy.signal import savgol_filter
+
     there = np.isfinite(log.columns[q])
     times, place = log.times[there], log.columns[q][there]
     if len(times) < _FEWEST:
