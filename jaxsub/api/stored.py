@@ -4,9 +4,6 @@ It holds the recordings as they were used, arrays by name, and the rest as JSON:
 are exact.
 """
 
-import json
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,11 +14,10 @@ from ..errors import InputError
 from ..findings import Finding
 from ..plain import to_json
 from ..recording import Recording
+from ..storage import opened_archive, write_archive
 
 RESULT = "result.npz"
 _SCHEMA, _TEXT = 1, "content"
-# what reading a file that is none of ours may raise
-_DAMAGED = (ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, zipfile.BadZipFile, zlib.error)
 
 
 class Stored(NamedTuple):
@@ -48,8 +44,8 @@ def store(
         findings = [finding.to_json() for finding in run.findings]
         runs.append({"name": run.name, "source": run.source, "first_row": run.first_row, "columns": list(run.columns),
                      "units": dict(run.units), "findings": findings})  # fmt: skip
-    content = to_json({"schema": _SCHEMA, "kind": kind, "runs": runs, **text}).encode()
-    np.savez_compressed(folder / RESULT, **{_TEXT: np.frombuffer(content, np.uint8)}, **named)  # pyright: ignore[reportArgumentType]
+    content = to_json({"schema": _SCHEMA, "kind": kind, "runs": runs, **text})
+    write_archive(folder / RESULT, _TEXT, content, named)
 
 
 def stored(folder: Path, kind: str) -> Stored:
@@ -58,21 +54,13 @@ def stored(folder: Path, kind: str) -> Stored:
     **Raises** `InputError` where there is no result of that `kind`, or one of another version.
     """
     path, remedy = folder / RESULT, f"give a folder that {kind}.save wrote"
-    if not path.is_file():
-        raise InputError(str(path), "does not exist", remedy)
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            text = json.loads(bytes(arrays[_TEXT]))
-            found = text["schema"], text["kind"]
-            if found != (_SCHEMA, kind):
-                raise InputError(str(path), f"is a {found[1]} of schema {found[0]}", remedy)
-            own = {name.removeprefix("own/"): arrays[name] for name in arrays.files if name.startswith("own/")}
-            recordings = tuple(_recording(index, run, arrays) for index, run in enumerate(text.pop("runs")))
-    except _DAMAGED as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(str(path), "cannot be read", remedy) from error
-    return Stored(text, own, recordings)
+    with opened_archive(path, _TEXT, "cannot be read", remedy) as (text, arrays):
+        found = text["schema"], text["kind"]
+        if found != (_SCHEMA, kind):
+            raise InputError(str(path), f"is a {found[1]} of schema {found[0]}", remedy)
+        own = {name.removeprefix("own/"): arrays[name] for name in arrays if name.startswith("own/")}
+        recordings = tuple(_recording(index, run, arrays) for index, run in enumerate(text.pop("runs")))
+        return Stored(text, own, recordings)
 
 
 def _recording(index: int, run: dict[str, Any], arrays: Mapping[str, np.ndarray]) -> Recording:

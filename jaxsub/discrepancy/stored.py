@@ -8,8 +8,6 @@ import dataclasses
 import json
 import types
 import typing
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..storage import opened_archive, write_archive
 from .diagnosis import Conclusions
 
 STORED = "diagnosis.npz"
 _SCHEMA, _TEXT = 1, "conclusions"
-# what reading a file that is none of ours may raise
-_DAMAGED = (ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error)
 
 
 def save_conclusions(conclusions: Conclusions, path: Path) -> None:
@@ -31,7 +28,7 @@ def save_conclusions(conclusions: Conclusions, path: Path) -> None:
     encoded = _encoded(dataclasses.replace(conclusions, explanations=()), arrays)
     text = json.dumps({"schema": _SCHEMA, _TEXT: encoded})
     named = {f"array_{index}": array for index, array in enumerate(arrays)}
-    np.savez_compressed(path, **{_TEXT: np.frombuffer(text.encode(), np.uint8)}, **named)  # pyright: ignore[reportArgumentType]
+    write_archive(path, _TEXT, text, named)
 
 
 def load_conclusions(path: Path) -> Conclusions:
@@ -40,19 +37,10 @@ def load_conclusions(path: Path) -> Conclusions:
     **Raises** `InputError` where the file is absent, damaged, or of another version.
     """
     remedy = "give the folder of a diagnosis by this version of jaxsub, or run `jaxsub diagnose` again"
-    if not path.is_file():
-        raise InputError(str(path), "does not exist", remedy)
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            content = json.loads(bytes(stored[_TEXT]))
-            if content["schema"] != _SCHEMA:
-                raise InputError(str(path), f"has schema {content['schema']} and not {_SCHEMA}", remedy)
-            found = _decoded(Conclusions, content[_TEXT], stored)
-    except (*_DAMAGED, OSError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(str(path), "cannot be read as a diagnosis", remedy) from error
-    return found
+    with opened_archive(path, _TEXT, "cannot be read as a diagnosis", remedy) as (content, arrays):
+        if content["schema"] != _SCHEMA:
+            raise InputError(str(path), f"has schema {content['schema']} and not {_SCHEMA}", remedy)
+        return _decoded(Conclusions, content[_TEXT], arrays)
 
 
 def _encoded(value: Any, arrays: list[np.ndarray], name: str = "") -> Any:
