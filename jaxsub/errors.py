@@ -48,6 +48,12 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
     return by_lower[matches[0]] if matches else None
 
 
+def suggestion(word: str, known: Iterable[str], otherwise: str) -> str:
+    """What an error says to do about a `word` that is not `known`: the nearest that is, or `otherwise`."""
+    close = nearest(word, known)
+    return f"did you mean {close}?" if close else otherwise
+
+
 def optional(module: str, extra: str, purpose: str) -> Any:
     """Import `module`, which the extra `extra` installs. Raises InputError, saying what installs it, where absent."""
     try:

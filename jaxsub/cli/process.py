@@ -11,7 +11,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from ..errors import InputError, OutputError, nearest
+from ..errors import InputError, OutputError, nearest, suggestion
 from .interruption import INTERRUPTED, Watch, leave
 from .options import Options
 
@@ -47,7 +47,7 @@ class Location(click.ParamType):
 
 
 class Name(click.Choice):
-    """One of some names, of which a mistyped one is told its nearest neighbour."""
+    """One of some names; the error for a mistyped one names the nearest."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The name.
@@ -56,8 +56,8 @@ class Name(click.Choice):
             click.UsageError: it is none of them.
         """
         if value not in self.choices:
-            near = nearest(str(value), map(str, self.choices))
-            hint = f"did you mean {near}?" if near else f"choose one of {', '.join(map(str, self.choices))}"
+            names = [str(name) for name in self.choices]
+            hint = suggestion(str(value), names, f"choose one of {', '.join(names)}")
             self.fail(f"{value!r:.60} is not known; {hint}", param, ctx)
         return value
 

@@ -1,6 +1,5 @@
 """The list of effects that a diagnosis may name, those that are installed beside it, and those of a user's script."""
 
-import importlib.util
 import inspect
 from importlib import metadata
 from pathlib import Path
@@ -28,6 +27,7 @@ from .mechanisms import AsymmetricDamping, CoulombFriction, CubicStiffness, Satu
 from .memory import FluidMemory, Hysteresis
 from .motion import Facts
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
+from .script import executed
 from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
 from .sensors import SensorBias, SensorDrift, SensorScale
@@ -112,14 +112,12 @@ def from_script(path: str | Path) -> tuple[type[AbstractEffect], ...]:
     path = Path(path)
     if not path.is_file():
         raise InputError(str(path), "is no file", "give the path of a Python script")
-    spec = importlib.util.spec_from_file_location(f"jaxsub_effects_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise InputError(str(path), "is no Python script", "give a file that ends in .py")
-    module = importlib.util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
+        module = executed(path)
     except Exception as error:  # whatever the script does
         raise InputError(str(path), f"{type(error).__name__}: {error}", "mend the script") from error
+    if module is None:
+        raise InputError(str(path), "is no Python script", "give a file that ends in .py")
     own = [kind for kind in vars(module).values() if is_effect(kind) and kind.__module__ == module.__name__]
     if not own:
         raise InputError(str(path), "defines no effect", "write a subclass of AbstractForce and the like")

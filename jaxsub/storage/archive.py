@@ -23,7 +23,7 @@ def write_archive(path: Path, key: str, text: str, arrays: Mapping[str, np.ndarr
 
 @contextmanager
 def opened_archive(path: Path, key: str, fault: str, remedy: str) -> Iterator[tuple[Any, Mapping[str, np.ndarray]]]:
-    """What `write_archive` wrote to `path` under `key`: the content of its text, and its arrays, read when they are looked up.
+    """What `write_archive` wrote to `path`: the content of its text, under `key`, and its arrays, read at their use.
 
     **Raises** `InputError` with the `remedy` where there is no file; with the `fault` too where it is damaged, or where
     what is done in the block finds it so.

@@ -5,7 +5,7 @@ import math
 import re
 from typing import Any
 
-from ..errors import InputError, nearest
+from ..errors import InputError, suggestion
 from ..parameters import Parameter
 from ..units import UnknownUnit, is_si, same_dimension, si_unit
 
@@ -46,8 +46,7 @@ class Table:
         """The value of `key`, one of `known`."""
         value = self.required(key)
         if value not in known:
-            close = nearest(str(value), known)
-            hint = f"did you mean {close}?" if close else f"choose one of {', '.join(known)}"
+            hint = suggestion(str(value), known, f"choose one of {', '.join(known)}")
             raise InputError(self.place(key), f"{value!r:.60} is not known", hint)
         return value
 
@@ -77,8 +76,7 @@ class Table:
 
 def unknown_key(place: str, known: tuple[str, ...], key: str) -> InputError:
     """The error for a key that nothing reads."""
-    close = nearest(key, known)
-    return InputError(place, "unknown key", f"did you mean {close}?" if close else f"known: {', '.join(known)}")
+    return InputError(place, "unknown key", suggestion(key, known, f"known: {', '.join(known)}"))
 
 
 def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Parameter]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..effects import derivative
-from ..errors import InputError, nearest
+from ..errors import InputError, suggestion
 
 # a symbol such as Y_v|v|, Y_vvv/U or bow.gain; not the exponent of a number such as 2.5e-3
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_][\w|]*(?:/U+(?!\w)|\.[A-Za-z_]\w*)?")
@@ -75,8 +75,7 @@ def tied_values(ties: tuple[Tie, ...], values: Mapping[str, float], where: str) 
             if name in tied:
                 raise InputError(place, f"follows {name}, which follows others", "write it in terms of those")
             if name not in values:
-                close = nearest(name, list(values))
-                hint = f"did you mean {close}?" if close else f"known: {', '.join(values)}"
+                hint = suggestion(name, values, f"known: {', '.join(values)}")
                 raise InputError(place, f"follows {name}, which is no number of the vehicle", hint)
         try:
             value = tie.of(values)

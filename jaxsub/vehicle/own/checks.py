@@ -9,7 +9,7 @@ import jax
 import numpy as np
 
 from ...arrays import Values
-from ...errors import InputError, nearest
+from ...errors import InputError, suggestion
 from ..base import Layout
 from .model import Model, numbers_of
 
@@ -23,8 +23,7 @@ def model_of(model: type[Model] | Model, values: Mapping[str, Values], where: st
     fields = {field.name: field for field in numbers_of(kind)}
     for name in values:
         if name not in fields:
-            close = nearest(name, fields)
-            hint = f"did you mean {close}?" if close else f"{kind.__name__} has {', '.join(fields) or 'none'}"
+            hint = suggestion(name, fields, f"{kind.__name__} has {', '.join(fields) or 'none'}")
             raise InputError(f"{where}: coefficients.{name}", f"is no number of {kind.__name__}", hint)
     if isinstance(model, Model):
         return dataclasses.replace(model, **values)

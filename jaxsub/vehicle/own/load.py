@@ -1,12 +1,11 @@
 """The class of a user's model, from the Python file that a vehicle file names."""
 
-import hashlib
-import importlib.util
 import inspect
 import sys
 from pathlib import Path
 
-from ...errors import InputError, nearest
+from ...effects.script import executed
+from ...errors import InputError, suggestion
 from .model import Model
 
 
@@ -24,24 +23,16 @@ def loaded(reference: str, folder: Path, place: str) -> type[Model]:
     path = (folder / file).resolve()
     if not path.is_file():
         raise InputError(place, f"{str(path)!r:.200} is no file", "give the path of a Python file from this one")
-    # the same class for the same text, so that programs compiled for it serve it when it is read again
-    module_name = f"jaxsub_own_{hashlib.sha256(str(path).encode() + path.read_bytes()).hexdigest()[:16]}"
-    module = sys.modules.get(module_name)
+    try:
+        module = executed(path)
+    except Exception as error:
+        raise InputError(place, f"{path.name} fails: {error!r:.200}", "run it by Python and mend it") from error
     if module is None:
-        spec = importlib.util.spec_from_file_location(module_name, path)
-        if spec is None or spec.loader is None:
-            raise InputError(place, f"{str(path)!r:.200} is no Python file", "give one that ends in .py")
-        module = sys.modules[module_name] = importlib.util.module_from_spec(spec)
-        try:
-            spec.loader.exec_module(module)
-        except Exception as error:
-            del sys.modules[module_name]
-            raise InputError(place, f"{path.name} fails: {error!r:.200}", "run it by Python and mend it") from error
+        raise InputError(place, f"{str(path)!r:.200} is no Python file", "give one that ends in .py")
     kinds = [key for key, value in vars(module).items() if isinstance(value, type) and issubclass(value, Model)]
     if name not in kinds:
         own = [kind for kind in kinds if kind != "Model"]
-        close = nearest(name, own)
-        remedy = f"did you mean {close}?" if close else f"it has {', '.join(own) or 'no subclass of jaxsub.Model'}"
+        remedy = suggestion(name, own, f"it has {', '.join(own) or 'no subclass of jaxsub.Model'}")
         raise InputError(place, f"{path.name} has no model {name}", remedy)
     return getattr(module, name)
 
