@@ -1,6 +1,7 @@
 """Simulations: a vehicle's answer to the inputs of recordings, and how far it is from what was measured."""
 
 import dataclasses
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -241,10 +242,12 @@ class Simulation(AbstractResult):
 
     def write(self, folder: Path) -> None:
         """Write a recording for each run, `vehicle.toml` and, from which `load` makes it again, `result.npz`."""
+        written = Counter[str]()
         for run in self.runs:
             stem = Path(run.recording.name).stem
-            pieces = len(list(folder.glob(f"{stem}*.csv")))
-            save(run.answer(), folder / (f"{stem}-{pieces + 1}.csv" if pieces else f"{stem}.csv"))
+            written[stem] += 1
+            # pieces of one run have its name
+            save(run.answer(), folder / f"{stem}{f'-{written[stem]}' if written[stem] > 1 else ''}.csv")
         write_vehicle(self.runs[0].vehicle, folder / VEHICLE)
         arrays = {f"outputs/{index}": run.outputs for index, run in enumerate(self.runs)}
         arrays |= {f"state/{index}": run.initial_state for index, run in enumerate(self.runs)}

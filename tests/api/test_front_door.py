@@ -1,6 +1,7 @@
 """`import jaxsub as js` offers typed names at no cost, and its functions answer as the commands do."""
 
 import ast
+import dataclasses
 import json
 import subprocess
 import sys
@@ -151,6 +152,15 @@ def test_simulation_is_that_of_the_command(files, rig, tmp_path, monkeypatch, ca
     again = js.Simulation.load(tmp_path / "saved")
     assert again.summary() == shown.summary() and again[1].to_json() == shown[1].to_json()
     np.testing.assert_array_equal(again.to_dataframe(), shown.to_dataframe())
+
+
+def test_every_run_of_a_simulation_has_a_file_of_its_own(rig, tmp_path):
+    """Claim: pieces of one run are numbered, and a name that another begins with is not taken for one of these."""
+    vehicle, run = rig
+    begins = {0.0: "run10", 2.0: "run1", 4.0: "run1"}
+    runs = [dataclasses.replace(run.between(t, t + 1.9), name=name) for t, name in begins.items()]
+    js.simulate(vehicle, runs).save(tmp_path / "saved")
+    assert sorted(path.name for path in (tmp_path / "saved").glob("*.csv")) == ["run1-2.csv", "run1.csv", "run10.csv"]
 
 
 def test_vehicle_and_recording_show_what_they_are(rig):
