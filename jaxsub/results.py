@@ -2,6 +2,7 @@
 
 from typing import cast
 
+import numpy as np
 import optimistix as optx
 
 
@@ -30,3 +31,11 @@ OUTCOMES = (
     "indefinite_inertia",
     "other",
 )
+
+
+def outcome_numbers(result: RESULTS) -> np.ndarray:
+    """The index to `OUTCOMES` of each `result`, of any shape; the last for what is none of the others."""
+    numbers = np.full(np.shape(result == RESULTS.successful), len(OUTCOMES) - 1, np.int8)
+    for number, name in enumerate(OUTCOMES[:-1]):
+        numbers[np.asarray(result == getattr(RESULTS, name))] = number
+    return numbers

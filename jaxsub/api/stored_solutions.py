@@ -11,7 +11,7 @@ import numpy as np
 from ..effects import AbstractEffect
 from ..estimate import SearchEnd, Solution, batch, evaluate
 from ..recording import Recording
-from ..results import OUTCOMES, RESULTS
+from ..results import OUTCOMES, RESULTS, outcome_numbers
 from ..vehicle import read_vehicle, write_vehicle
 from .stored import Stored, store, stored
 
@@ -64,5 +64,5 @@ def stored_solution(folder: Path, effects: Sequence[type[AbstractEffect]]) -> tu
 
 def _outcome(result: RESULTS) -> str:
     """The name of a result; a rare one of the optimiser's is a divergence."""
-    named = (name for name in OUTCOMES[:-1] if RESULTS[getattr(RESULTS, name)] == RESULTS[result])
-    return next(named, "nonlinear_divergence")
+    name = OUTCOMES[int(outcome_numbers(result))]
+    return "nonlinear_divergence" if name == OUTCOMES[-1] else name

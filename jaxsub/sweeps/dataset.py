@@ -6,8 +6,8 @@ import numpy as np
 import xarray
 
 from ..errors import InputError
+from ..results import OUTCOMES
 from .description import name_of
-from .run import OUTCOMES
 from .store import chunk_files, kept_plan, read_chunk
 
 AXES = ("vehicle", "recording", "noise", "start")

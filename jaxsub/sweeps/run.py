@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..estimate import METHODS, Problem, ends
 from ..estimate.method import share_for
-from ..results import OUTCOMES, RESULTS
+from ..results import outcome_numbers
 from .plan import Chunk, Plan
 
 Answers = dict[str, np.ndarray]
@@ -40,7 +40,7 @@ def run_chunks(plan: Plan, chunks: Sequence[Chunk]) -> list[Answers]:
         "cost": found.cost,
         "away": evaluated.away,
         "evaluations": found.evaluations,
-        "outcome": _outcomes(evaluated.result),
+        "outcome": outcome_numbers(evaluated.result),
     }
     whole = {name: np.asarray(values) for name, values in answers.items()}
     inside = [index * size + np.arange(chunk.last - chunk.first) for index, chunk in enumerate(chunks)]
@@ -49,10 +49,3 @@ def run_chunks(plan: Plan, chunks: Sequence[Chunk]) -> list[Answers]:
 
 def _physical(problem: Problem, starts: Float[Array, "n d"]) -> Float[Array, "n p"]:
     return jax.vmap(problem.transform.to_physical)(starts[:, : len(problem.prior_mean)])
-
-
-def _outcomes(result: RESULTS) -> np.ndarray:
-    code = np.full(len(np.asarray(result == RESULTS.successful)), len(OUTCOMES) - 1, np.int8)
-    for number, name in enumerate(OUTCOMES[:-1]):
-        code[np.asarray(result == getattr(RESULTS, name))] = number
-    return code

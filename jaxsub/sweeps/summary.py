@@ -10,9 +10,8 @@ from ..estimate import Assessment, Found, Problem, Rate, assess_residuals, basin
 from ..estimate.method import problems
 from ..estimate.starts import MARGIN
 from ..likelihood import output_errors
-from ..results import SUCCESSFUL
+from ..results import OUTCOMES, SUCCESSFUL
 from .plan import Plan
-from .run import OUTCOMES
 
 _LISTED = 5
 
