@@ -21,12 +21,12 @@ def position_rates(motion: Motion) -> dict[str, Signal]:
     phi, theta, psi = (motion.positions[name] for name in EULER)
     (sin_phi, cos_phi), (sin_theta, cos_theta) = sine_cosine(jnp.asarray(phi)), sine_cosine(jnp.asarray(theta))
     turning = (q * sin_phi + r * cos_phi) / cos_theta
-    across = v * cos_phi - w * sin_phi
-    ahead = u * cos_theta + (v * sin_phi + w * cos_phi) * sin_theta
     angles = {"psi": turning, "theta": q * cos_phi - r * sin_phi, "phi": p + turning * sin_theta}
     if QUATERNION[0] in motion.positions:
         moved = [row[0] * u + row[1] * v + row[2] * w for row in turned(motion.positions)]
         return angles | quaternion_rates(motion) | dict(zip("xyz", moved, strict=True))
+    across = v * cos_phi - w * sin_phi
+    ahead = u * cos_theta + (v * sin_phi + w * cos_phi) * sin_theta
     return angles | {
         "x": ahead * jnp.cos(psi) - across * jnp.sin(psi),
         "y": ahead * jnp.sin(psi) + across * jnp.cos(psi),
