@@ -1,7 +1,7 @@
 """Vehicles: one model that simulation, likelihood, filters, diagnosis and controllers share."""
 
 from .absorb import added_effects, with_coefficients
-from .assembly import build
+from .assembly import VehicleParts, build
 from .base import AbstractVehicle, Layout
 from .checks import require_inertia
 from .dimensions import check_units
@@ -26,6 +26,7 @@ __all__ = [
     "OwnModel",
     "Sensors",
     "SubmergedBody",
+    "VehicleParts",
     "added_effects",
     "build",
     "check_units",

@@ -48,32 +48,11 @@ Numbers = dict[str, tuple[float, Parameter]]
 Pairs = tuple[tuple[str, str], ...]
 
 
-def build(
-    *,
-    where: str,
-    name: str,
-    kind: str,
-    model: type[Model] | Model | None = None,
-    dof: tuple[str, ...] | None,
-    numbers: Numbers,
-    inputs: Pairs,
-    outputs: tuple[Output, ...],
-    prescribed: Pairs = (),
-    environment: Pairs = (),
-    hull: dict[str, float] | None = None,
-    coriolis: str = "linear",
-    attitude: str = "euler",
-    system: str = "",
-    ties: tuple[Tie, ...] = (),
-    input_units: dict[str, str] | None = None,
-    actuators: Actuators | None = None,
-    sensor_numbers: Numbers | None = None,
-    effects: tuple[AbstractEffect, ...] = (),
-    effect_rows: tuple[Parameter, ...] = (),
-) -> Vehicle:
-    """The vehicle of those parts.
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class VehicleParts:
+    """What a vehicle is put together from.
 
-    **Arguments**
+    **Fields**
 
     - `where`: what errors name. `name`: of the vehicle. `kind`: `submerged-body`, `mechanism` or `model`.
     - `dof`: its free equations.
@@ -88,57 +67,91 @@ def build(
     - `system`: in which the file gives its coefficients, as text.
     - `hull`: `length`, `diameter` (m; worked out from mass and inertia where absent), `reference_density` (kg/m³).
     - `effects`: those that the model has already, and `effect_rows` the rows of their free numbers.
+    """
+
+    where: str
+    name: str
+    kind: str
+    dof: tuple[str, ...] | None
+    numbers: Numbers
+    inputs: Pairs
+    outputs: tuple[Output, ...]
+    prescribed: Pairs
+    environment: Pairs
+    hull: dict[str, float]
+    model: type[Model] | Model | None
+    coriolis: str
+    attitude: str
+    system: str
+    ties: tuple[Tie, ...]
+    input_units: dict[str, str]
+    actuators: Actuators
+    sensor_numbers: Numbers
+    effects: tuple[AbstractEffect, ...]
+    effect_rows: tuple[Parameter, ...]
+
+
+def build(parts: VehicleParts) -> Vehicle:
+    """The vehicle of those `parts`.
 
     **Raises** `InputError` with `where` and the key for names it does not know, and for an inertia matrix that is
     not positive definite, with the coefficients that make it so.
     """
-    hull = dict(hull or {})
-    of_sensors = sensor_numbers or {}
+    where, numbers, of_sensors = parts.where, parts.numbers, parts.sensor_numbers
     _require_unlike(numbers, of_sensors, where)
     rows = tuple(row for _, row in (numbers | of_sensors).values())
     values = {key: number(value) for key, (value, _) in numbers.items()}
     given = {key: value for key, (value, _) in (numbers | of_sensors).items()}
-    given |= _before(actuators or Actuators(), effects)
-    tied = tied_values(ties, given, where)
+    given |= _before(parts.actuators, parts.effects)
+    tied = tied_values(parts.ties, given, where)
     values |= {key: number(value) for key, value in tied.items() if key in numbers}
-    if kind == "submerged-body":
+    hull = parts.hull
+    if parts.kind == "submerged-body":
         values = _complete(values, where)
         hull = _sizes(values, hull)
-    rows += effect_rows
+    rows += parts.effect_rows
     spreads = {row.name: number(row.spread or math.nan) for row in rows if row.varies}
     # a number of the vehicle and not of its layout, for which programs are compiled
-    rows = tuple(dataclasses.replace(row, spread=0.0) for row in rows)
-    equations = model.states if model is not None else dof or EQUATIONS
-    shown = tuple(output.state for output in outputs)
-    if attitude == "quaternion":
-        check_turning(equations, dict(prescribed), where)
-    turned = QUATERNION if attitude == "quaternion" else ()
-    positions = equations if kind == "mechanism" else ()
-    if kind == "submerged-body":
-        positions = _positions(equations, dict(prescribed), shown, turned)
-    positions += (*memory_states(effects), *(deviation(row.name) for row in rows if row.varies))
-    sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
-    layout = Layout(
-        name, kind, equations, positions, inputs, prescribed, environment, outputs, rows, **sizes, system=system,
-        ties=ties, input_units=tuple((input_units or {}).items()),
-    )  # fmt: skip
+    layout = _layout(parts, tuple(dataclasses.replace(row, spread=0.0) for row in rows), hull)
     density = hull.get("reference_density", STANDARD_DENSITY)
-    if model is not None:
-        vehicle = _own(model, values, layout, effects, where)
-    elif kind == "mechanism":
-        vehicle = _mechanism(values, layout, effects, where)
-    else:
-        devices = (actuators or Actuators()).in_water(density).with_values(values)
-        body = _body(values, layout, effects, devices, density, where)
-        vehicle = dataclasses.replace(body, coriolis=coriolis)
+    vehicle = _of_kind(parts, values, layout, density)
     sensors = Sensors({key: number(value) for key, (value, _) in of_sensors.items()}, density)
     vehicle = dataclasses.replace(vehicle, sensors=sensors, spreads=spreads)
-    if ties:
+    if parts.ties:
         vehicle = vehicle.with_values({})  # the numbers of effects and sensors that follow others
     check_effects(vehicle, where)
     check_variation(vehicle, where)
     require_inertia(vehicle, where)
     return vehicle
+
+
+def _layout(parts: VehicleParts, rows: tuple[Parameter, ...], hull: dict[str, float]) -> Layout:
+    """Names, columns and the `rows` of all numbers."""
+    equations = parts.model.states if parts.model is not None else parts.dof or EQUATIONS
+    prescribed, turned = dict(parts.prescribed), ()
+    if parts.attitude == "quaternion":
+        check_turning(equations, prescribed, parts.where)
+        turned = QUATERNION
+    positions = equations if parts.kind == "mechanism" else ()
+    if parts.kind == "submerged-body":
+        positions = _positions(equations, prescribed, tuple(output.state for output in parts.outputs), turned)
+    positions += (*memory_states(parts.effects), *(deviation(row.name) for row in rows if row.varies))
+    sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
+    return Layout(
+        parts.name, parts.kind, equations, positions, parts.inputs, parts.prescribed, parts.environment, parts.outputs,
+        rows, **sizes, system=parts.system, ties=parts.ties, input_units=tuple(parts.input_units.items()),
+    )  # fmt: skip
+
+
+def _of_kind(parts: VehicleParts, values: dict, layout: Layout, density: float) -> Vehicle:
+    """The vehicle of its kind with the numbers `values`, in water of a reference `density` (kg/m³)."""
+    if parts.model is not None:
+        return _own(parts.model, values, layout, parts.effects, parts.where)
+    if parts.kind == "mechanism":
+        return _mechanism(values, layout, parts.effects, parts.where)
+    devices = parts.actuators.in_water(density).with_values(values)
+    body = _body(values, layout, parts.effects, devices, density, parts.where)
+    return dataclasses.replace(body, coriolis=parts.coriolis)
 
 
 def _require_unlike(numbers: Numbers, of_sensors: Numbers, where: str) -> None:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..parameters import Parameter
 from ..units import same_dimension
 from .actuators import read_actuators
-from .assembly import BODY_KEYS, VECTORS, Vehicle, build
+from .assembly import BODY_KEYS, VECTORS, Vehicle, VehicleParts, build
 from .checks import check_count
 from .coefficient_units import coefficient_unit
 from .own import Model, channels_of, loaded
@@ -86,7 +86,7 @@ def vehicle_from(
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)} if entries else {}
     built_in, effect_rows = _read_effects(entries, where, kinds, quantities)
     coriolis, attitude = _read_model(top.table("model"))
-    return build(
+    parts = VehicleParts(
         where=where,
         name=top.word("name"),
         kind=kind,
@@ -108,6 +108,7 @@ def vehicle_from(
         effects=(*(effect for effect, _ in devices.stages), *built_in),
         effect_rows=(*(row for _, row in devices.stages), *effect_rows),
     )
+    return build(parts)
 
 
 def _refuse_others(top: Table, kind: str) -> None:
