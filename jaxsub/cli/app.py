@@ -182,6 +182,33 @@ def navigate(log: Path, sensors: Path, reference: Path | None, out: Path, overwr
 
 
 @app.command()
+@_vehicle
+@click.argument("source", default="-")
+@click.option("--clean", type=_PATH, multiple=True, help="A run without faults, to calibrate on; repeatable.")
+@click.option(
+    "--false-alarms-per-hour", type=click.FloatRange(1e-6, 60.0), default=0.01, show_default=True,
+    help="The rate of false alarms that sets the threshold.",
+)  # fmt: skip
+@click.option("--state", type=_PATH, help="A file of the state, by which a new process goes on.")
+@click.option("--header", help="Header of the columns, for a source that sends none.")
+@click.option("--longest", metavar="SECONDS", type=click.FloatRange(1.0), default=3600.0, show_default=True,
+              help="The longest time over which a change may gather.")  # fmt: skip
+@click.option("--interval", metavar="SECONDS", type=click.FloatRange(1e-4), help="Usual time between samples.")
+@click.option("--status-every", metavar="SECONDS", type=click.FloatRange(1.0), default=600.0, show_default=True,
+              help="Time between two reports of what was wrong with the stream.")  # fmt: skip
+@_out()
+@common
+def watch(vehicle: Path, source: str, **arguments: Any) -> None:
+    """Watch a vehicle's stream sample by sample; alarms as JSON lines.
+
+    SOURCE is a CSV file, - for standard input, udp://HOST:PORT or serial:DEVICE.
+    """
+    from . import watch as command
+
+    command.run(vehicle, source, command.Asked(**arguments))
+
+
+@app.command()
 @click.argument("kind", type=click.Choice((*KINDS, _RIG, _SENSORS)), required=False)
 @click.argument("sensor_log", type=_PATH, required=False)
 @dimensions

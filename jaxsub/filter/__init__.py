@@ -2,6 +2,7 @@
 
 from .consistent import ConsistentFuzzyNoise
 from .defaults import state_scale, vehicle_filter
+from .disturbed import DisturbedProcess
 from .ekf import AbstractFilter, Estimate, ExtendedKalmanFilter, FilterState, on_line
 from .form import AbstractForm, Covariance, SquareRoot
 from .fuzzy import FuzzyNoise
@@ -26,6 +27,7 @@ __all__ = [
     "ConstantNoise",
     "Covariance",
     "DelayedFilter",
+    "DisturbedProcess",
     "Drive",
     "Estimate",
     "ExtendedKalmanFilter",

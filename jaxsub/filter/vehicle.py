@@ -72,11 +72,18 @@ class VehicleProcess(AbstractProcess):
         names = [row.name for row in self.vehicle.layout.free]
         return self.vehicle.with_values(dict(zip(names, self.transform.to_physical(theta), strict=True)))
 
-    def step(self, x: Float[Array, " s"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " s"]:
-        """The sampled step for these parameters.
+    def step(
+        self,
+        x: Float[Array, " s"],
+        theta: Float[Array, " p"],
+        sample: Sample,
+        push: Float[Array, "2 n"] | None = None,
+    ) -> Float[Array, " s"]:
+        """The sampled step for these parameters, under the extra force `push` (2, n), N or N m, if given.
 
-        Its value is that of `Sampled`. Its derivative by the parameters is good to the scheme's order: they move the
-        linear part as a force and not through the matrix exponential, whose derivatives would cost more than all else.
+        `push` acts at the start and the end of the interval, and linearly between. The step's value is that of
+        `Sampled`. Its derivative by the parameters is good to the scheme's order: they move the linear part as a force
+        and not through the matrix exponential, whose derivatives would cost more than all else.
         """
         vehicle = self.vehicle_at(theta)
         inverse = jnp.linalg.inv(vehicle.mass_matrix())
@@ -84,7 +91,7 @@ class VehicleProcess(AbstractProcess):
         frozen = jax.lax.stop_gradient(linear)
         table = step_table(frozen, sample.elapsed[None] / self.substeps)
         sampled = Sampled(vehicle, inverse, table, self.substeps, linear - frozen)
-        return sampled.step(x, sample.inputs.nodes, jnp.asarray(0))
+        return sampled.step(x, sample.inputs.nodes, jnp.asarray(0), push)
 
     def observe(self, x: Float[Array, " s"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " c"]:
         """The vehicle's outputs."""

@@ -33,6 +33,7 @@ GUIDES = (
     "describe-your-sensors",
     "logs-and-data",
     "navigate",
+    "watch",
     "commands",
     "how-diagnosis-works",
     "which-method",

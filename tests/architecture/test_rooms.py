@@ -15,8 +15,8 @@ FILES = sorted(HOUSE.rglob("*.py"))
 ORDER = (
     "errors", "findings", "plain", "fingerprint", "programs", "storage", "unit_names", "units", "arrays", "methods",
     "parameters", "results", "symbolic", "recording", "effects", "sensors", "vehicle", "simulation", "filter",
-    "navigation", "likelihood", "estimate", "information", "checks", "discrepancy", "control", "sweeps", "report",
-    "api", "cli", "__main__",
+    "navigation", "likelihood", "estimate", "information", "checks", "discrepancy", "monitoring", "control", "sweeps",
+    "report", "api", "cli", "__main__",
 )  # fmt: skip
 
 
