@@ -183,6 +183,32 @@ def navigate(log: Path, sensors: Path, reference: Path | None, out: Path, overwr
 
 @app.command()
 @_vehicle
+@_runs
+@_out(required=True)
+@click.option(
+    "--outage", "outages", metavar="CHANNEL:FROM:TO", multiple=True, help="Channels, from and to s; repeatable."
+)
+@click.option("--improved", type=_PATH, help="A further vehicle file, to compare in the outages.")
+@_columns
+@_overwrite
+@common
+def filter(
+    vehicle: Path,
+    runs: tuple[Path, ...],
+    out: Path,
+    outages: tuple[str, ...],
+    improved: Path | None,
+    columns: Path | None,
+    overwrite: bool,
+) -> None:
+    """Estimate states with the vehicle's dynamics as motion model, filtered and smoothed, with their bands."""
+    from . import filter as command
+
+    command.run(vehicle, runs, out, outages, improved, overwrite, columns)
+
+
+@app.command()
+@_vehicle
 @click.argument("source", default="-")
 @click.option("--clean", type=_PATH, multiple=True, help="A run without faults, to calibrate on; repeatable.")
 @click.option(

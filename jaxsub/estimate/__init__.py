@@ -4,6 +4,7 @@ from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_resid
 from .batches import batch, side_by_side
 from .between_runs import RunVariation
 from .combined import Chain, Global
+from .dead_reckoning import Outage, Track, kinematic_filter, model_filter, tracks_of
 from .disturbance import estimate_disturbance
 from .filtered import Filtered
 from .fitting import AbstractSearchEnd, SearchEnd, Solution, channel_rms, evaluate, fit, race, search
@@ -11,6 +12,7 @@ from .initial_states import initial_guess, rest, state_channels
 from .integration_steps import substeps_for, substeps_unseen
 from .method import AbstractMethod, Found, Iterative, Passes, by_cost
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
+from .path_disturbance import disturbance_along
 from .posterior_draws import posterior
 from .problem import Expansion, Problem, require_free
 from .search_ends import Ends, ends
@@ -31,18 +33,21 @@ __all__ = [
     "Found",
     "Global",
     "Iterative",
+    "Outage",
     "Passes",
     "Problem",
     "Rate",
     "RunVariation",
     "SearchEnd",
     "Solution",
+    "Track",
     "assess",
     "assess_residuals",
     "basins",
     "batch",
     "by_cost",
     "channel_rms",
+    "disturbance_along",
     "ekf",
     "ends",
     "estimate_disturbance",
@@ -51,7 +56,9 @@ __all__ = [
     "gauss_newton",
     "gradient",
     "initial_guess",
+    "kinematic_filter",
     "mekf",
+    "model_filter",
     "nelder_mead",
     "newton",
     "newton_eq10",
@@ -66,4 +73,5 @@ __all__ = [
     "substeps_for",
     "substeps_unseen",
     "success",
+    "tracks_of",
 ]

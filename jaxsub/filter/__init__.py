@@ -2,11 +2,12 @@
 
 from .consistent import ConsistentFuzzyNoise
 from .defaults import state_scale, vehicle_filter
-from .disturbed import DisturbedProcess
+from .disturbed import DisturbedProcess, disturbed_filter
 from .ekf import AbstractFilter, Estimate, ExtendedKalmanFilter, FilterState, on_line
 from .form import AbstractForm, Covariance, SquareRoot
 from .fuzzy import FuzzyNoise
 from .gate import AbstractGate, InnovationGate, Open
+from .kinematic import KinematicProcess
 from .late import DelayedFilter, Late, Past
 from .mekf import ModifiedKalmanFilter
 from .model import AbstractProcess, Sample, linearised, select
@@ -38,6 +39,7 @@ __all__ = [
     "Innovation",
     "InnovationGate",
     "InnovationNoise",
+    "KinematicProcess",
     "Late",
     "ModifiedKalmanFilter",
     "Open",
@@ -49,6 +51,7 @@ __all__ = [
     "Smoothed",
     "SquareRoot",
     "VehicleProcess",
+    "disturbed_filter",
     "fuzzy_line",
     "identify",
     "last",

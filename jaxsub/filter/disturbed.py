@@ -9,7 +9,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from .ekf import ExtendedKalmanFilter
+from .gate import AbstractGate, Open
 from .model import AbstractProcess, Sample
+from .noise import ConstantNoise
 from .vehicle import VehicleProcess
 
 
@@ -66,3 +69,22 @@ class DisturbedProcess(AbstractProcess):
     def innovation(self, measured: Float[Array, " c"], expected: Float[Array, " c"]) -> Float[Array, " c"]:
         """The difference; angles of a body wrapped to (-π, π]."""
         return self.process.innovation(measured, expected)
+
+
+def disturbed_filter(
+    process: DisturbedProcess,
+    sigma: Float[Array, " c"],
+    start_std: Float[Array, " s"],
+    density: Float[Array, " s"] | None = None,
+    gate: AbstractGate | None = None,
+) -> ExtendedKalmanFilter:
+    """The filter of a `process`, whose sensors have the noise `sigma` (c,), SI.
+
+    `start_std` (s,) are standard deviations of an initial state, SI. `density` (s,) is the root of white noise of the
+    vehicle's states, per root second, by default none. `gate` says which measurements are believed, by default all.
+    """
+    force = process.force
+    white = jnp.zeros_like(start_std) if density is None else density
+    noise = ConstantNoise(jnp.diag(jnp.concatenate([white, jnp.zeros_like(force)])))
+    x_root = jnp.diag(jnp.concatenate([start_std, force]))
+    return ExtendedKalmanFilter(process, noise, jnp.diag(sigma), x_root, gate=gate or Open())

@@ -1,6 +1,5 @@
 """A monitor of a vehicle: its filter's disturbance estimated on clean runs, or left at what the sensors' noise says."""
 
-import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,20 +9,17 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..errors import InputError
-from ..estimate import batch, estimate_disturbance, initial_guess
-from ..filter import ConstantNoise, DisturbedProcess, ExtendedKalmanFilter, InnovationGate, VehicleProcess, state_scale
+from ..estimate import batch, disturbance_along, initial_guess
+from ..filter import DisturbedProcess, InnovationGate, VehicleProcess, disturbed_filter, state_scale
 from ..filter.defaults import DENSITY
-from ..likelihood import Disturbance, filter_runs
+from ..likelihood import Disturbance
 from ..navigation import Stream
 from ..recording import Recording
-from ..recording.runs import Runs
 from ..simulation import sampled_states, synthetic
 from ..vehicle import AbstractVehicle
 from .monitor import AlarmTest, Monitor
 from .signatures import windows_for
 
-# rounds in which the disturbance is estimated along a path that the last one led
-_ROUNDS = 3
 # of the motion that a monitor without clean runs is calibrated along, samples
 _ALONG = 512
 # times the usual interval, of a gap across which the model is not asked to lead
@@ -63,7 +59,7 @@ def model_of(vehicle: AbstractVehicle, clean: Sequence[Recording]) -> WatchedMod
     known, sigma = _known(vehicle)
     runs = batch(known, clean)
     start, start_std = initial_guess(known, runs)
-    disturbance = _estimated(known, runs, sigma, start, start_std)
+    disturbance = disturbance_along(known, runs, sigma, start, start_std)
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(disturbance)):
         raise InputError("clean runs", "the vehicle's filter diverges along them", "identify the vehicle first")
     interval = float(np.median(np.concatenate([np.diff(run.times) for run in clean])))
@@ -102,10 +98,10 @@ def monitor_of(model: WatchedModel, quiet: float = QUIET) -> Monitor:
     process = DisturbedProcess(
         VehicleProcess.of(model.vehicle, model.substeps), jnp.asarray(d.force), jnp.asarray(d.time)
     )
-    noise = ConstantNoise(jnp.diag(jnp.concatenate([jnp.asarray(model.density), jnp.zeros(n)])))
-    sigma = jnp.asarray(model.sigma * np.asarray(d.noise))
-    x_root = jnp.diag(jnp.concatenate([jnp.asarray(model.start_std), jnp.asarray(d.force)]))
-    filter = ExtendedKalmanFilter(process, noise, jnp.diag(sigma), x_root, gate=InnovationGate.of(c))
+    sigma, start_std, density = (
+        jnp.asarray(values) for values in (model.sigma * np.asarray(d.noise), model.start_std, model.density)
+    )
+    filter = disturbed_filter(process, sigma, start_std, density, InnovationGate.of(c))
     windows = windows_for(model.longest / model.interval)
     test = AlarmTest(jnp.asarray(jnp.inf), jnp.ones((windows, n + c)), jnp.asarray(float(quiet)))
     held = (True,) * len(layout.held) + (False,) * len(layout.interpolated)
@@ -145,17 +141,3 @@ def _known(vehicle: AbstractVehicle) -> tuple[AbstractVehicle, Float[np.ndarray,
             raise InputError(where, "its sigma is to be estimated", "give sigma; jaxsub identify estimates it")
     known = vehicle.holding([row.name for row in vehicle.layout.free])
     return known, np.array([output.sigma for output in vehicle.layout.outputs], float)
-
-
-def _estimated(vehicle: AbstractVehicle, runs: Runs, sigma: np.ndarray, start: Array, start_std: Array) -> Disturbance:
-    """The disturbance of largest likelihood, along the path that each round's estimate leads."""
-    n, noise = len(vehicle.layout.equations), jnp.asarray(sigma)
-    usual = float(np.median(np.asarray(runs.steps)[np.asarray(runs.step_of)]))
-    inertia = np.diag(np.asarray(vehicle.mass_matrix()))
-    force = inertia * np.asarray(state_scale(vehicle, sigma))[:n] / (10.0 * usual)
-    found = Disturbance(force, np.full(n, 20.0 * usual), np.ones(len(sigma)))
-    for _ in range(_ROUNDS):
-        followed = filter_runs(vehicle, runs, noise, found, start, start_std)
-        found = estimate_disturbance(followed.system, followed.residual, np.zeros((1, 1)), found, rounds=2)
-        found = dataclasses.replace(found, **{k: np.asarray(v) for k, v in vars(found).items()})
-    return found
