@@ -142,7 +142,7 @@ def tracks_of(
         for r, run in enumerate(runs):
             out = np.zeros(length, bool)
             out[: len(run.times)] = outage.covers(run)
-            own[r][np.ix_(out, [layout.channels.index(c) for c in outage.channels])] = False
+            own[r][np.ix_(out, np.array([layout.channels.index(c) for c in outage.channels]))] = False
         masks.append(own)
     s, n = len(layout.states), len(filter.x_root) - len(layout.states)
     starts = jnp.pad(jnp.asarray(initial_guess(known, stacked)[0]), ((0, 0), (0, n)))
