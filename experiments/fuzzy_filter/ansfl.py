@@ -37,10 +37,10 @@ from .recordings_figure import Outage, draw_ansfl
 # s that the inertial units' clock is ahead of the reference's, by cross-correlation of the rates (PROVENANCE.md)
 _CLOCK = {8: 0.40, 9: 0.40, 10: 0.40, 11: 0.40, 13: 0.40, 15: 0.42, 17: -0.36, 24: -0.63}
 # °/s about x that autopilot and gyros together show, by unit (PROVENANCE.md)
-_BIAS = {1: (-1.1, -0.7), 2: (-2.2, -1.8), 3: (-1.9, -1.5), 4: (1.1, 1.5)}
+BIAS = {1: (-1.1, -0.7), 2: (-2.2, -1.8), 3: (-1.9, -1.5), 4: (1.1, 1.5)}
 _HEADINGS = 6
-_SETTLED = 10.0  # s before which errors do not count; the first outage begins five later
-_OUTAGE = 10.0  # s
+SETTLED = 10.0  # s before which errors do not count; the first outage begins five later
+OUTAGE = 10.0  # s
 _SHOWN = 4  # the record of the figure
 GPS_STD = np.array([0.5, 0.5, 1.0])  # m
 _RTK_STD = np.array([0.05, 0.05, 0.1])  # m; its height is written to a tenth
@@ -107,8 +107,8 @@ class Prepared(NamedTuple):
 
 def outage_times(record: Record) -> np.ndarray:
     """s at which the GPS falls silent, right after a fix, for ten seconds each: three in flight."""
-    last = math.floor(record.reference_times[-1] - _OUTAGE - 0.5)
-    return np.round(np.linspace(_SETTLED + 5.0, last, 3)) + 0.05
+    last = math.floor(record.reference_times[-1] - OUTAGE - 0.5)
+    return np.round(np.linspace(SETTLED + 5.0, last, 3)) + 0.05
 
 
 def fixes(record: Record, noise: float) -> tuple[np.ndarray, np.ndarray]:
@@ -116,10 +116,10 @@ def fixes(record: Record, noise: float) -> tuple[np.ndarray, np.ndarray]:
     seconds = np.arange(math.ceil(record.times[0]), math.floor(record.times[-1]) + 1)
     at = np.searchsorted(record.times, seconds)
     off = GPS_STD * np.random.default_rng(record.path).normal(size=(len(at), 3))
-    return at, _interpolated(record.times[at], record.reference_times, record.position) + noise * off
+    return at, interpolated(record.times[at], record.reference_times, record.position) + noise * off
 
 
-def _interpolated(times: np.ndarray, at: np.ndarray, values: np.ndarray) -> np.ndarray:
+def interpolated(times: np.ndarray, at: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.stack([np.interp(times, at, column) for column in values.T], axis=1)
 
 
@@ -185,7 +185,7 @@ def follow(rule: str, record: Prepared) -> Followed:
     (bank, _, saved), (x, x_std) = jax.lax.scan(step, carry, (jnp.arange(count), record.samples))
 
     def dark(state: FilterState, begin: jax.Array) -> tuple[jax.Array, jax.Array]:
-        cut = partial(jax.lax.dynamic_slice_in_dim, start_index=begin + 1, slice_size=round(_OUTAGE * 120.0))
+        cut = partial(jax.lax.dynamic_slice_in_dim, start_index=begin + 1, slice_size=round(OUTAGE * 120.0))
         samples = jax.tree.map(cut, record.samples)
         silent = Sample(samples.inputs, samples.elapsed, samples.outputs, jnp.zeros_like(samples.mask), samples.scale)
         estimates = jax.lax.scan(lambda state, sample: filter.step(state, sample), state, silent)[1]
@@ -207,22 +207,22 @@ def _follow_all(rule: str, batch: Prepared) -> Followed:
     return jax.vmap(partial(follow, rule))(batch)
 
 
-def _rms(errors: np.ndarray) -> float:
+def rms(errors: np.ndarray) -> float:
     """Of distances, or of numbers."""
     return float(np.sqrt(np.mean(np.sum(errors.reshape(len(errors), -1) ** 2, axis=1))))
 
 
-def _attitude_errors(record: Record, angles: np.ndarray, times: np.ndarray) -> dict[str, float]:
+def attitude_errors(record: Record, angles: np.ndarray, times: np.ndarray) -> dict[str, float]:
     """Degrees after settling: roll and pitch of (K, 2 or 3) `angles` at `times`, raw and less their mean."""
-    judged = record.reference_times >= _SETTLED
+    judged = record.reference_times >= SETTLED
     judged &= record.reference_times <= times[-1]
-    found = _interpolated(record.reference_times[judged], times, np.unwrap(angles, axis=0))
+    found = interpolated(record.reference_times[judged], times, np.unwrap(angles, axis=0))
     apart = np.degrees(found - record.attitude[judged, : found.shape[1]])
     apart = (apart + 180.0) % 360.0 - 180.0
     scores = {}
     for name, column in zip(("roll", "pitch", "heading"), apart.T, strict=False):
-        scores[name] = _rms(column)
-        scores[f"{name}_less_mean"] = _rms(column - column.mean())
+        scores[name] = rms(column)
+        scores[f"{name}_less_mean"] = rms(column - column.mean())
     return scores
 
 
@@ -239,22 +239,22 @@ def _scores(record: Record, noise: float, found: Followed) -> dict:
     x, x_std = np.asarray(found.x)[:K], np.asarray(found.x_std)[:K]
     at, measured = fixes(record, noise)
     others = _others(record.times[at], measured, GPS_STD if noise else _RTK_STD)
-    times = record.reference_times[(record.reference_times >= _SETTLED) & (record.reference_times <= record.times[-1])]
-    truth = lambda times: _interpolated(times, record.reference_times, record.position)
-    position = {"fused": _rms(_interpolated(times, record.times, x[:, 7:10]) - truth(times))}
-    position |= {name: _rms(track.at(times) - truth(times)) for name, track in others.items()}
+    times = record.reference_times[(record.reference_times >= SETTLED) & (record.reference_times <= record.times[-1])]
+    truth = lambda times: interpolated(times, record.reference_times, record.position)
+    position = {"fused": rms(interpolated(times, record.times, x[:, 7:10]) - truth(times))}
+    position |= {name: rms(track.at(times) - truth(times)) for name, track in others.items()}
     outages = []
     for i, begin in enumerate(np.searchsorted(record.times, outage_times(record))):
         # every twelfth sample: ten a second
-        span = record.times[begin + 1 : begin + 1 + round(_OUTAGE * 120.0)][11::12]
+        span = record.times[begin + 1 : begin + 1 + round(OUTAGE * 120.0)][11::12]
         apart = {"fused": np.asarray(found.outage_x[i])[11::12, 7:10] - truth(span)}
         apart |= {
             name: track.without_fixes(span, float(record.times[begin])) - truth(span) for name, track in others.items()
         }
-        outages.append({name: {"rms": _rms(e), "final": float(np.linalg.norm(e[-1]))} for name, e in apart.items()})
-    low, high = _BIAS[record.unit]
+        outages.append({name: {"rms": rms(e), "final": float(np.linalg.norm(e[-1]))} for name, e in apart.items()})
+    low, high = BIAS[record.unit]
     return {
-        "attitude_deg": _attitude_errors(record, np.asarray(_euler(found.x))[:K], record.times),
+        "attitude_deg": attitude_errors(record, np.asarray(_euler(found.x))[:K], record.times),
         "position_rms_m": position,
         "outages_m": outages,
         "gyro_bias_x_deg_s": {
@@ -276,7 +276,7 @@ def _drawn(name: str, record: Record, found: Followed) -> Outage:
     at, measured = fixes(record, 1.0)
     begin = int(np.searchsorted(record.times, outage_times(record)[1]))
     since = float(record.times[begin])
-    before, dark = slice(begin - 600, begin + 1), slice(begin + 1, begin + 1 + round(_OUTAGE * 120.0))
+    before, dark = slice(begin - 600, begin + 1), slice(begin + 1, begin + 1 + round(OUTAGE * 120.0))
     times = np.concatenate([record.times[before], record.times[dark]])
     joined = lambda whole, outage: np.concatenate([np.asarray(whole)[before], np.asarray(outage)[1]])
     others = {
@@ -289,7 +289,7 @@ def _drawn(name: str, record: Record, found: Followed) -> Outage:
         measured[at <= begin, :2],
         times,
         since,
-        _interpolated(times, record.reference_times, record.position)[:, :2],
+        interpolated(times, record.reference_times, record.position)[:, :2],
         joined(found.x, found.outage_x)[:, 7:9],
         joined(found.x_std, found.outage_std)[:, 6:8],
         others,
@@ -311,7 +311,7 @@ def _summary(scores: dict[str, dict]) -> dict:
         "outage_final_median_m": {m: float(np.median([o[m]["final"] for o in outages])) for m in methods},
         "gyro_bias_x_deg_s": {
             f"unit {unit}": {"found": [b for n, b in biases.items() if n.endswith(f"unit {unit}")], "told": stated}
-            for unit, stated in _BIAS.items()
+            for unit, stated in BIAS.items()
         },
         "diverged": sum(r["diverged"] for r in of),
     }
@@ -334,6 +334,6 @@ def run(out: Path, quick: bool) -> dict:
         results[f"{rule}, {gps}"] = {"summary": _summary(scores), "records": scores}
         if (rule, gps) == ("constant", "gps"):
             draw_ansfl(out / "ansfl.png", _drawn(names[_SHOWN], recorded[_SHOWN], each[_SHOWN]))
-    units = {f"path {r.path}, unit {r.unit}": _attitude_errors(r, r.dot, r.times) for r in recorded}
+    units = {f"path {r.path}, unit {r.unit}": attitude_errors(r, r.dot, r.times) for r in recorded}
     means = {a: float(np.mean([of[a] for of in units.values()])) for a in next(iter(units.values()))}
     return {"filters": results, "units_own_filter_deg": {"mean": means, "records": units}}

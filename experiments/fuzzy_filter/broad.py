@@ -43,7 +43,7 @@ from ..data import data_folder
 from .recordings_figure import draw_broad
 from .recordings_peers import Readings, peers
 
-_INTERVAL = 7.0 / 2000.0  # s between samples
+INTERVAL = 7.0 / 2000.0  # s between samples
 _BEHIND = 3  # samples by which the magnetometer is behind the gyros
 _EVERY = 10  # samples from one correction to the next, 35 ms
 _STILL = 1.0  # s at the start in which the board lies still: every trial begins with half a minute of it
@@ -61,7 +61,7 @@ class Settings(NamedTuple):
     reach_time: jax.Array | float = 1.0  # s
     field_spread: jax.Array | float = 0.03  # of the field, between places in a room
     field_time: jax.Array | float = 1.0  # s from one place to another
-    magnetic_delay: jax.Array | float = _BEHIND * _INTERVAL  # s
+    magnetic_delay: jax.Array | float = _BEHIND * INTERVAL  # s
     wander: jax.Array | float = 1.0  # of the biases: 2 °/h and 10⁻⁵ g a root second
 
 
@@ -109,7 +109,7 @@ def rmse(trial: Trial, q: np.ndarray) -> dict[str, float]:
 
 def gyros_delay(trial: Trial) -> float:
     """s by which the field m is behind the gyros: the least Σ|ṁ + ω × m|² over whole samples, and between."""
-    smooth = lambda values, order: np.asarray(savgol_filter(values, 21, 2, deriv=order, delta=_INTERVAL, axis=0))
+    smooth = lambda values, order: np.asarray(savgol_filter(values, 21, 2, deriv=order, delta=INTERVAL, axis=0))
     still = trial.times < trial.times[0] + _STILL
     rate = smooth(trial.gyro - trial.gyro[still].mean(axis=0), 0)
     slope, field = smooth(trial.magnetometer, 1), smooth(trial.magnetometer, 0)
@@ -117,16 +117,16 @@ def gyros_delay(trial: Trial) -> float:
     loss = np.array([np.mean((slope + np.cross(np.roll(rate, lag, axis=0), field)) ** 2) for lag in lags])
     best = int(np.clip(np.argmin(loss), 1, len(lags) - 2))
     left, middle, right = loss[best - 1 : best + 2]
-    return float(_INTERVAL * (lags[best] + 0.5 * (left - right) / (left - 2.0 * middle + right)))
+    return float(INTERVAL * (lags[best] + 0.5 * (left - right) / (left - 2.0 * middle + right)))
 
 
-def _timely(trial: Trial) -> np.ndarray:
+def without_delay(trial: Trial) -> np.ndarray:
     return np.roll(trial.magnetometer, -_BEHIND, axis=0)
 
 
 def field_heading(trial: Trial) -> dict[str, float]:
     """Heading of the magnetometer's field in the reference, degrees east of its north: what no filter can know."""
-    seen = _timely(trial)[trial.counts]
+    seen = without_delay(trial)[trial.counts]
     east, north, _ = Rotation.from_quat(trial.reference[trial.counts], scalar_first=True).apply(seen).T
     heading = np.degrees(np.unwrap(np.arctan2(east, north)))
     return {"mean": float(heading.mean()), "std": float(heading.std())}
@@ -178,7 +178,7 @@ def follow(rule: str, settings: Settings, trial: Prepared) -> tuple[jax.Array, j
     process = StrapdownNavigation(
         sensors, MagneticField(trial.horizontal, trial.down, settings.field_spread * strength)
     )
-    interval = _EVERY * _INTERVAL
+    interval = _EVERY * INTERVAL
     place = settings.reach * jnp.sqrt(2.0 * settings.reach_time / interval)
     heading = jnp.sqrt(2.0 * settings.field_time / interval)
     # nothing measures the velocity
@@ -208,22 +208,22 @@ def _scores(recorded: list[Trial], rule: str, settings: list[Settings], batch: P
     q, diverged = map(np.asarray, _follow_all(rule, stacked, batch))
     return [
         {
-            trial.name: rmse(trial, _to_enu(part[: len(trial.times)])) | {"diverged": bool(broken)}
+            trial.name: rmse(trial, to_enu(part[: len(trial.times)])) | {"diverged": bool(broken)}
             for trial, part, broken in zip(recorded, of_settings, broke, strict=True)
         }
         for of_settings, broke in zip(q, diverged, strict=True)
     ]
 
 
-def _to_enu(q: np.ndarray) -> np.ndarray:
+def to_enu(q: np.ndarray) -> np.ndarray:
     return (_NED_TO_ENU * Rotation.from_quat(q, scalar_first=True)).as_quat(scalar_first=True)
 
 
-def _peer_scores(trial: Trial, dip: float, quick: bool) -> dict[str, dict[str, float]]:
+def peer_scores(trial: Trial, dip: float, quick: bool) -> dict[str, dict[str, float]]:
     """Errors of installed filters; VQF also with the magnetometer's delay taken off, as ours has it."""
-    readings = Readings(trial.gyro, trial.accelerometer, trial.magnetometer, _INTERVAL, dip)
+    readings = Readings(trial.gyro, trial.accelerometer, trial.magnetometer, INTERVAL, dip)
     found = dict(peers(readings, ("vqf",) if quick else ("vqf", "ahrs")))
-    timely = peers(readings._replace(magnetometer=_timely(trial)), ("vqf",))
+    timely = peers(readings._replace(magnetometer=without_delay(trial)), ("vqf",))
     found |= {f"{name}_without_delay": q for name, q in timely}
     return {name: rmse(trial, q) for name, q in found.items()}
 
@@ -250,7 +250,7 @@ def run(out: Path, quick: bool) -> dict:
     dips = np.arctan2(batch.down, batch.horizontal).tolist()
     # the peers loop in Python, a minute for the four trials: beside the filters, in a process of their own
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        waited = pool.map(_peer_scores, recorded, dips, [quick] * len(recorded))
+        waited = pool.map(peer_scores, recorded, dips, [quick] * len(recorded))
         settings = [Settings()] if quick else [Settings(), Settings(scale_error=0.0)]
         ours = {rule: _scores(recorded, rule, settings, batch) for rule in _rules()}
         table = {} if quick else _sensitivity(recorded, batch)

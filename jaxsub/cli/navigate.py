@@ -69,10 +69,11 @@ def _show(content: dict[str, Any]) -> None:
 
 
 def _field_line(field: dict[str, Any]) -> str:
-    """Delay and hard iron of the magnetometer in a sentence."""
+    """Delay and calibration of the magnetometer in a sentence."""
     delay = f"{1e3 * field['delay']:.3g} ± {1e3 * field['delay_std']:.2g} ms ({_TAKEN[field['delayed']]})"
-    spread = f"{100.0 * field['before']:.2g} % as read and {100.0 * field['after']:.2g} % without its hard iron"
-    return f"magnetometer: delay {delay}; the field's strength differs by {spread} ({_TAKEN[field['corrected']]})"
+    spread = f"{100.0 * field['before']:.2g} % as read and {100.0 * field['after']:.2g} % calibrated"
+    taken = "left as read" if field["corrected"] == "none" else f"calibration: {field['corrected']}"
+    return f"magnetometer: delay {delay}; the field's strength differs by {spread} ({taken})"
 
 
 def _shown(unit: str, *values: float) -> tuple[str, ...]:

@@ -6,15 +6,19 @@ $$p(t) = p_0 + v_0 t + \tfrac12 g t^2 + C \left(\iint R\,(f - b_a)\,dt^2 + R(t)\
 
 whose unknowns are the attitude C at the start, $p_0$, $v_0$ and the biases of accelerometer and gyro. R depends on the
 latter. Fixes of velocity follow the same, integrated once. The unknowns are found by least squares, over a window that
-is doubled until it shows the heading. Source: Wu and Pan (2013), Velocity/position integration formula, part I, IEEE
+is doubled until it shows the heading. The sensors' white noise makes errors of the integrals that grow and are
+correlated: with density s and n integrals, $\int_0^{\min(t,u)}s^2(t-r)^{n-1}(u-r)^{n-1}/(n-1)!^2\,dr$ of times t and u.
+Source: Wu and Pan (2013), Velocity/position integration formula, part I, IEEE
 Transactions on Aerospace and Electronic Systems 49 (2); biases are added.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -38,6 +42,7 @@ class FixAlignment(NamedTuple):
 
     - `q`: (4,) attitude; `velocity`: (3,) m/s, NED. `gyro_bias`: (3,) rad/s; `accelerometer_bias`: (3,) m/s².
     - `std`: (9,) standard deviations of the attitude about north, east and down, rad, and of both biases.
+    - `q_without`, `velocity_without`: the likeliest with biases as they were known beforehand.
     """
 
     q: np.ndarray
@@ -45,6 +50,8 @@ class FixAlignment(NamedTuple):
     gyro_bias: np.ndarray
     accelerometer_bias: np.ndarray
     std: np.ndarray
+    q_without: np.ndarray
+    velocity_without: np.ndarray
 
     @property
     def shows_heading(self) -> bool:
@@ -67,6 +74,7 @@ def aligned_by_fixes(
     """
     noise = suite.only("accelerometer").noise
     assert noise is not None
+    white = _white(log, suite)
     fixes = [_Fixes.of(log, suite, sensor) for sensor in suite.of("gps", "usbl", "velocity")]
     least = max((one.times[_LEAST_FIXES - 1] for one in fixes if len(one.times) >= _LEAST_FIXES), default=np.inf)
     if not np.isfinite(least):
@@ -82,13 +90,20 @@ def aligned_by_fixes(
         until = first + length
         if until >= min(least, end):
             part, seen = motion.until(until), [one.until(until) for one in fixes]
+            weights = [one.weights(first, white) for one in seen]
             about = _headed(part, seen, level, x) if about is None else about
-            x, std = _fitted(part, seen, about, x, *prior)
+            x, covariance = _fitted(part, seen, weights, about, x, *prior)
+            std = np.sqrt(np.diag(covariance))
             if std[2] < _KNOWN or until >= end:
                 break
         length *= 2.0
     attitude = Rotation.from_rotvec(x[:3]) * about
-    return FixAlignment(np.roll(attitude.as_quat(), 1), _velocity(part, seen[0], attitude, x), x[3:6], x[6:], std)
+    turn = covariance[:3, 3:] @ np.linalg.solve(covariance[3:, 3:], prior[0][3:] - x[3:])
+    starts = ((attitude, x), (Rotation.from_rotvec(turn) * attitude, prior[0]))
+    (q, velocity), without = (
+        (np.roll(one.as_quat(), 1), _velocity(part, seen[0], one, biases)) for one, biases in starts
+    )
+    return FixAlignment(q, velocity, x[3:6], x[6:], std, *without)
 
 
 class _Path(NamedTuple):
@@ -179,10 +194,50 @@ class _Fixes(NamedTuple):
         """(m, n) powers of time that the unknown first position and velocity add."""
         return np.vander(self.times - start, self.integrals, increasing=True)
 
+    def weights(self, start: float, white: tuple[float, float]) -> np.ndarray:
+        """(a, m, m) by which residuals of each axis become white, without what the first position and velocity add.
+
+        `white`: densities of the specific force and the rate, m/s²/√Hz and rad/s/√Hz.
+        """
+        since = self.times - start
+        force, rate = white
+        # an attitude that strays turns gravity
+        strayed = force**2 * _integrated(since, self.integrals)
+        strayed += (GRAVITY * rate) ** 2 * _integrated(since, self.integrals + 1)
+        return np.stack([self._weight(start, strayed + sigma**2 * np.eye(len(since))) for sigma in self.sigma])
+
+    def _weight(self, start: float, covariance: np.ndarray) -> np.ndarray:
+        whitening = solve_triangular(np.linalg.cholesky(covariance), np.eye(len(covariance)), lower=True)
+        Q, _ = np.linalg.qr(whitening @ self.powers(start))
+        return whitening - Q @ (Q.T @ whitening)
+
     def without_start(self, values: np.ndarray, start: float) -> np.ndarray:
         """`values` (m, n) less what the first position and velocity could add to them."""
         Q, _ = np.linalg.qr(self.powers(start))
         return values - Q @ (Q.T @ values)
+
+
+def _white(log: SensorLog, suite: SensorSuite) -> tuple[float, float]:
+    """Densities of the errors of specific force and rate: of noise, and of scale errors by how much these vary."""
+    found = []
+    for kind in ("accelerometer", "gyro"):
+        sensor = suite.only(kind)
+        assert sensor.noise is not None
+        varies = float(np.std(log.complete(sensor.name)[1], axis=0).max())
+        found.append(math.hypot(sensor.noise.density, sensor.noise.motion_density * varies))
+    return found[0], found[1]
+
+
+def _integrated(since: np.ndarray, integrals: int) -> np.ndarray:
+    """(m, m) covariance at times `since` (m,) of white noise of density one that is integrated so many times."""
+    a, b = np.minimum(since[:, None], since), np.maximum(since[:, None], since)
+    match integrals:
+        case 1:
+            return a
+        case 2:
+            return a**2 * (3.0 * b - a) / 6.0
+        case _:
+            return a**3 * (10.0 * b**2 - 5.0 * a * b + a**2) / 120.0
 
 
 def _headed(motion: _Motion, fixes: Sequence[_Fixes], level: Rotation, x: np.ndarray) -> Rotation:
@@ -198,24 +253,25 @@ def _headed(motion: _Motion, fixes: Sequence[_Fixes], level: Rotation, x: np.nda
 
 
 def _fitted(
-    motion: _Motion, fixes: Sequence[_Fixes], about: Rotation, x: np.ndarray, mean: np.ndarray, std: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The turn from `about` and the biases, (9,), that explain the fixes beside their prior, and their deviations."""
+    motion: _Motion, fixes: Sequence[_Fixes], weights: Sequence[np.ndarray], about: Rotation, x: np.ndarray,
+    mean: np.ndarray, std: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """The turn from `about` and the biases, (9,), that explain the fixes beside their prior, and their covariance."""
     start = motion.times[0]
 
     def residuals(x: np.ndarray) -> np.ndarray:
         attitude, path, found = Rotation.from_rotvec(x[:3]) * about, motion.path(x), [(x - mean) / std]
-        for one in fixes:
+        for one, weight in zip(fixes, weights, strict=True):
             shown = attitude.apply(one.by_sensors(path))[:, : one.values.shape[1]]
-            rest = one.without_start(one.apart_from_gravity(start) - shown, start)
-            found.append((rest / one.sigma).ravel())
+            rest = one.apart_from_gravity(start) - shown
+            found.append(np.einsum("akm,ma->ka", weight, rest).ravel())
         return np.concatenate(found)
 
     found = least_squares(residuals, x, x_scale=std)
     covariance = np.linalg.inv(found.jac.T @ found.jac)
     moved = np.eye(9)
     moved[:3, :3] = _turns_of_vector(found.x[:3])
-    return found.x, np.sqrt(np.diag(moved @ covariance @ moved.T))
+    return found.x, moved @ covariance @ moved.T
 
 
 def _turns_of_vector(v: np.ndarray) -> np.ndarray:

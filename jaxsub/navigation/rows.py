@@ -47,9 +47,9 @@ class Rows:
 def rows_of(log: SensorLog, suite: SensorSuite) -> Rows:
     """The rows of a log: inertial readings in each, and measurements in the row nearest to when they were taken.
 
-    Inertial readings of an interval are the means of those at its ends; where some are missing they are interpolated,
-    and over longer gaps, or at a stop, they have a larger standard deviation. **Raises** `InputError` where
-    fewer than two rows have inertial readings.
+    Inertial readings of an interval are the means of those at its ends, or that at its end where a reading is a mean
+    itself; where some are missing they are interpolated, and over longer gaps, or at a stop, they have a larger
+    standard deviation. **Raises** `InputError` where fewer than two rows have inertial readings.
     """
     findings: list[Finding] = []
     gyro, accelerometer = suite.only("gyro"), suite.only("accelerometer")
@@ -125,7 +125,7 @@ def _driving(log: SensorLog, sensor: Sensor, findings: list[Finding]) -> tuple[n
     stuck = np.where(stop, np.abs(np.nan_to_num(read)), 0.0)
     # a reading spoils the intervals on both of its sides
     stuck = np.maximum(stuck, np.concatenate([stuck[:1] * 0.0, stuck[:-1]]))
-    mean = 0.5 * (whole + np.concatenate([whole[:1], whole[:-1]]))
+    mean = whole if sensor.sampling == "mean" else 0.5 * (whole + np.concatenate([whole[:1], whole[:-1]]))
     return whole, mean, np.maximum(lost, stuck)
 
 

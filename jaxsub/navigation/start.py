@@ -75,16 +75,15 @@ def start_of(log: SensorLog, suite: SensorSuite) -> Start:
         bias, bias_std = rates.mean(axis=0), min(bias_std, gyro.noise.density / math.sqrt(_WINDOW) + 7.3e-5)
     known = {"tilt_std": tilt} if rest else {}
     by_fixes = aligned_by_fixes(log, suite, q, bias, bias_std, **known) if heading == "unknown" else None
-    offset = np.zeros(3)
     std = np.repeat([tilt, slow, place, bias_std, accelerometer.noise.bias, max(gyro.noise.scale_error, 1e-6)], 3)
     std[2] = turn
     if by_fixes is not None:
-        q, velocity, bias, offset = by_fixes.q, by_fixes.velocity, by_fixes.gyro_bias, by_fixes.accelerometer_bias
+        # the filter is given the same fixes again: biases are as beforehand, and of the attitude, which is wider, nine
+        # tenths of what it finds are of its own
+        q, velocity = by_fixes.q_without, by_fixes.velocity_without
         heading = "by fixes" if by_fixes.shows_heading else "unknown"
-        # the filter is given the same fixes again: wider, nine tenths of what it finds are of its own
-        std[[0, 1, 2, *range(9, 15)]] = WIDER * by_fixes.std
-        std[:3] = np.minimum(std[:3], UNKNOWN)
-    x = np.concatenate([q, velocity, position, bias, offset, np.zeros(SCALES)])
+        std[:3] = np.minimum(WIDER * by_fixes.std[:3], UNKNOWN)
+    x = np.concatenate([q, velocity, position, bias, np.zeros(3 + SCALES)])
     return Start(x, std, rest, heading)
 
 

@@ -35,8 +35,6 @@ from .strapdown import SensorNoise, StrapdownNavigation
 from .suite import Sensor, SensorSuite
 from .suite.log import SensorLog
 
-# s for which a motion goes one way: errors that grow with it are white over longer times
-_STROKE = 0.5
 # of an adaptive rule's least noise, its most
 _MOST = 30.0
 # names of what is known beforehand of position and velocity
@@ -69,13 +67,12 @@ def filter_of(
             aids.append(aid)
             roots.append(np.full(3, size))
             names.append(name)
-    share = math.sqrt(2.0 * _STROKE)
     adds = suite.rule != "consistent"
     noise = SensorNoise(
         gyro.noise.density if adds else 0.0,
         accelerometer.noise.density if adds else 0.0,
-        gyro.noise.scale_error * share,
-        accelerometer.noise.scale_error * share,
+        gyro.noise.motion_density,
+        accelerometer.noise.motion_density,
         math.inf,
     )
     inertial = StrapdownNavigation(noise) if field is None else StrapdownNavigation(noise, field)

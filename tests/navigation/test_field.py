@@ -46,7 +46,7 @@ def test_delay_and_hard_iron_are_found_and_taken_off():
     for seed in range(8):
         log, suite, fit = with_field(turning(seed, 0.8), suite_of(TEXT))
         ratios.append([(fit.delay - LATE) / fit.delay_std, *((1e6 * fit.hard_iron - IRON) / (1e6 * fit.hard_iron_std))])
-        assert fit.delayed and fit.corrected and fit.after < 0.3 * fit.before
+        assert fit.delayed and fit.corrected == "hard-iron" and fit.after < 0.3 * fit.before
         assert suite.only("magnetometer").delay == fit.delay and suite.only("magnetometer").delay_std == 0.0
         strength = np.linalg.norm(log.readings["magnetometer"], axis=1)
         assert strength.std() / strength.mean() < 0.02
@@ -59,7 +59,23 @@ def test_what_the_motion_does_not_show_is_left():
     """Claim: of a board that hardly turns neither is taken off, and two warnings say how well they are known."""
     before = turning(1, 0.001)
     log, suite, fit = with_field(before, suite_of(TEXT))
-    assert not fit.delayed and not fit.corrected
+    assert not fit.delayed and fit.corrected == "none"
     assert [finding.check for finding in log.findings] == ["magnetometer", "magnetometer"]
     np.testing.assert_array_equal(log.readings["magnetometer"], before.readings["magnetometer"])
     assert suite.only("magnetometer") == dataclasses.replace(suite_of(TEXT).only("magnetometer"), delay_std=0.0)
+
+
+def test_soft_iron_and_misaligned_axes_are_found_and_taken_off():
+    """Claim: over four logs they lie within four standard errors, and calibrated readings turn as the field does."""
+    D = np.array([[0.02, 0.03, -0.02], [-0.01, -0.03, 0.01], [0.02, 0.04, 0.01]])
+    text = TEXT.replace("hard-iron", "soft-iron")
+    for seed in range(4):
+        log = turning(seed, 0.8)
+        seen = log.readings["magnetometer"] @ np.linalg.inv(np.eye(3) + D).T
+        log = dataclasses.replace(log, readings=log.readings | {"magnetometer": seen})
+        after, _, fit = with_field(log, suite_of(text))
+        assert fit.corrected == "soft-iron" and fit.after < 0.5 * fit.before
+        ratio = (fit.soft_iron - np.eye(3) - D) / fit.soft_iron_std
+        assert (np.abs(ratio) < 4.0).all(), ratio
+        still = turning(seed, 0.8).readings["magnetometer"] - 1e-6 * IRON
+        assert np.abs(after.readings["magnetometer"] - still).max() < 2e-6

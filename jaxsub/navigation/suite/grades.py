@@ -9,6 +9,8 @@ from typing import NamedTuple
 from ...effects import GRAVITY
 
 _DEGREE, _MILLI_G = math.radians(1.0), 1e-3 * GRAVITY
+# s for which a motion goes one way: errors that grow with it are white over longer times
+_STROKE = 0.5
 
 
 class Grade(NamedTuple):
@@ -24,6 +26,11 @@ class Grade(NamedTuple):
     bias: float
     wander: float
     scale_error: float
+
+    @property
+    def motion_density(self) -> float:
+        """√s: density of the noise that the scale error makes of a motion of size one that goes to and fro."""
+        return self.scale_error * math.sqrt(2.0 * _STROKE)
 
 
 GRADES: dict[str, dict[str, Grade]] = {

@@ -19,7 +19,8 @@ from .suite import KINDS, RULES, Kind, Motion, Sensor, SensorSuite, Vector
 
 _EVERY = ("kind", "column", "channel", "unit", "frame")
 _MOST = 50
-_CALIBRATIONS = ("none", "hard-iron")
+_CALIBRATIONS = ("none", "hard-iron", "soft-iron")
+_SAMPLINGS = ("point", "mean")
 # s, standard deviation of a delay that is to be estimated
 _DELAY_STD = 0.1
 _HALF_TURN = math.pi
@@ -238,6 +239,7 @@ def _positive(table: Table, key: str) -> float:
 _READERS: dict[str, Callable[[Table, str], Any]] = {
     "mounting": _mounting, "lever_arm": _vector, "correlation": _not_negative, "delay": _delay, "rate": _positive,
     "range": _positive, "declination": _declination, "density": _water, "beacon": _vector,
+    "sampling": lambda table, key: table.choice(key, _SAMPLINGS),
     "calibration": lambda table, key: table.choice(key, _CALIBRATIONS),
     "latitude": lambda table, key: read_latitude(table.data[key], table.place(key)),
     "origin": lambda table, key: read_origin(table.data[key], table.place(key)),

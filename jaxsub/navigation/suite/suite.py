@@ -41,7 +41,7 @@ def _triad(value: T) -> dict[str, T]:
     return {axis: value for axis in _AXES}  # noqa: C420
 
 
-_INERTIAL = ("grade", "density", "bias", "wander", "scale_error", "range", "mounting")
+_INERTIAL = ("grade", "density", "bias", "wander", "scale_error", "range", "sampling", "mounting")
 _AIDING = ("sigma", "correlation", "delay", "rate")
 
 KINDS: dict[str, Kind] = {
@@ -83,6 +83,8 @@ class Sensor:
       `delay_std`: s, its standard deviation, zero where it is known.
     - `rate`: Hz at which it measures at most; zero where each sample is a measurement.
     - `noise`: of an inertial sensor. `range`: where it is at its stop, SI.
+    - `sampling`: of an inertial sensor, whether a reading is that at its time, `point`, or the mean since the one
+      before, `mean`.
     - `declination`: rad, magnetic north east of true north. `calibration`: of a magnetometer from the log.
     - `density` (kg/m³), `latitude` (rad) and `offset` (Pa): by which depth follows from pressure.
     - `origin`: latitude and longitude (rad) where x and y are zero, the first fix where None. `beacon`: m, NED.
@@ -103,6 +105,7 @@ class Sensor:
     rate: float = 0.0
     noise: Grade | None = None
     range: float = math.inf
+    sampling: str = "point"
     declination: float = 0.0
     calibration: str = "none"
     density: float | None = None

@@ -1,0 +1,1 @@
+"""Raw sensors of real motions through `jaxsub navigate` alone, against references."""
