@@ -70,7 +70,7 @@ def _apart(record: Record, run: Recording, times: np.ndarray) -> np.ndarray:
 
 
 def _scored(record: Record, out: Path) -> dict:
-    """Attitude (°) and position (m) after ten seconds, by filter and smoother; the filter's in the last outage."""
+    """Attitude (°) and position (m) after ten seconds, by filter and smoother; first units also without fixes."""
     written = _navigated(record, out)
     told = record.reference_times[record.reference_times >= SETTLED]
     told = told[told <= written.filtered.times[-1]]
@@ -79,10 +79,11 @@ def _scored(record: Record, out: Path) -> dict:
         angles = np.stack([run.column(one) for one in ("phi", "theta", "psi")], axis=1)
         scores[of] = attitude_errors(record, angles, run.times) | {"position_m": rms(_apart(record, run, told))}
     # the library's outages are judged ten times a second too
-    begin = float(outage_times(record)[-1])
-    times = begin + 0.1 * np.arange(1, round(10.0 * OUTAGE) + 1)
-    outage = _apart(record, _navigated(record, out, begin).filtered, times)
-    scores["outage_m"] = {"rms": rms(outage), "final": float(np.linalg.norm(outage[-1]))}
+    if record.unit == 1:
+        begin = float(outage_times(record)[-1])
+        times = begin + 0.1 * np.arange(1, round(10.0 * OUTAGE) + 1)
+        outage = _apart(record, _navigated(record, out, begin).filtered, times)
+        scores["outage_m"] = {"rms": rms(outage), "final": float(np.linalg.norm(outage[-1]))}
     low, high = BIAS[record.unit]
     found = written.content["constants"]["gyro_bias_x"]
     bias = {"found": float(np.degrees(found["value"])), "std": float(np.degrees(found["standard_error"]))}
@@ -103,13 +104,15 @@ def run(out: Path, quick: bool) -> dict:
     root = lambda values: float(np.sqrt(np.mean(np.square(values))))
     for of in ("filter", "smoother"):
         mean[of]["position_m"] = root([scores[of]["position_m"] for scores in each])
-    mean["filter"] |= {f"outage_{key}_m": root([s["outage_m"][key] for s in each]) for key in ("rms", "final")}
     known = library(out, True)
     of_library = known["filters"]["constant, gps"]
     mean["library"] = of_library["summary"]["attitude_deg"]
     mean["library"] |= {"position_m": of_library["summary"]["position_rms_m"]["fused"]}
-    lasts = {by: [record["outages_m"][-1][by] for record in of_library["records"].values()] for by in _WITHOUT_FIXES}
-    mean["library"] |= {f"outage_{key}_m": root([last[key] for last in lasts["fused"]]) for key in ("rms", "final")}
+    # the units fly together
+    firsts = [name for name, scores in found.items() if "outage_m" in scores]
+    lasts = {by: [of_library["records"][name]["outages_m"][-1][by] for name in firsts] for by in _WITHOUT_FIXES}
+    for of, outages in (("filter", [found[name]["outage_m"] for name in firsts]), ("library", lasts["fused"])):
+        mean[of] |= {f"outage_{key}_m": root([outage[key] for outage in outages]) for key in ("rms", "final")}
     return {
         "records": found,
         "mean": mean,

@@ -4,7 +4,6 @@ The sensor file is of the class of the board's sensors, in round numbers, and on
 magnetometer's delay nor anything else that was found on these trials.
 """
 
-import json
 from pathlib import Path
 
 import jax
@@ -14,21 +13,18 @@ from scipy.spatial.transform import Rotation
 
 from jaxsub.recording import Recording
 
-from ..data import data_folder
 from ..fuzzy_filter.broad import (
     INTERVAL,
     Prepared,
     Settings,
     Trial,
     follow,
-    peer_scores,
     prepared,
     rmse,
     to_enu,
     trials,
 )
 from .command import columns, navigated
-from .figure import draw
 
 SENSORS = """
 schema = 1
@@ -70,30 +66,20 @@ def _library(trial: Trial) -> dict[str, float]:
     return rmse(trial, to_enu(np.asarray(q)))
 
 
-def _scored(trial: Trial, out: Path, quick: bool) -> dict:
-    """Errors by method in degrees, and what the command says of the magnetometer."""
+def _scored(trial: Trial, out: Path) -> dict:
+    """Errors of ours in degrees, and what the command says of the magnetometer."""
     parts = columns("g", trial.gyro) | columns("a", trial.accelerometer) | columns("m", trial.magnetometer)
-    written = navigated(Recording(trial.name, trial.times, parts, trial.name), SENSORS, out / "broad")
-    field = written.content["magnetometer"]
+    written = navigated(Recording(trial.name, trial.times, parts, trial.name), SENSORS, out)
     methods = {"filter": rmse(trial, quaternions(written.filtered))}
     methods |= {"smoother": rmse(trial, quaternions(written.smoothed)), "library": _library(trial)}
-    start = prepared(trial, len(trial.times))
-    dip = float(np.arctan2(start.down, start.horizontal))
     return {
-        "rmse_deg": methods | peer_scores(trial, dip, quick),
-        "magnetometer": field,
+        "rmse_deg": methods,
+        "magnetometer": written.content["magnetometer"],
         "seconds": written.seconds,
         "duration": len(trial.times) * INTERVAL,
     }
 
 
 def run(out: Path, quick: bool) -> dict:
-    """Errors by trial and method; `quick` takes one trial and leaves out the filters of `ahrs`."""
-    found = {trial.name: _scored(trial, out, quick) for trial in trials()[: 1 if quick else None]}
-    published = json.loads((data_folder("broad") / "trials_and_published_rmse.json").read_text(encoding="utf-8"))
-    for name, scores in found.items():
-        scores["rmse_deg"] |= {f"published_{of}": published[name][of] for of in ("madgwick", "mahony")}
-    methods = next(iter(found.values()))["rmse_deg"]
-    mean = {of: float(np.mean([scores["rmse_deg"][of]["total"] for scores in found.values()])) for of in methods}
-    draw(out / "navigate.png", {name: scores["rmse_deg"] for name, scores in found.items()})
-    return {"trials": found, "mean_total_deg": mean}
+    """Errors by trial of the command and of the library; `quick` takes one trial."""
+    return {"trials": {trial.name: _scored(trial, out / "broad") for trial in trials()[: 1 if quick else None]}}

@@ -1,6 +1,6 @@
 """The picture of this experiment: orientation errors by trial and method."""
 
-from collections.abc import Mapping
+import json
 from pathlib import Path
 
 import matplotlib
@@ -19,8 +19,13 @@ _METHODS = {
 }
 
 
-def draw(path: Path, trials: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
-    """Total error of each method on each trial, with the part of it that is inclination."""
+def run(out: Path, quick: bool) -> dict:
+    """Draws what the parts `peers` and `broad` found: total errors, with the part of them that is inclination."""
+    ours, peers = (
+        json.loads((out / "parts" / f"{name}.json").read_text(encoding="utf-8"))["trials"]
+        for name in ("broad", "peers")
+    )
+    trials = {name: peers[name] | scores["rmse_deg"] for name, scores in ours.items()}
     figure, axis = plt.subplots(figsize=(11.0, 4.6), layout="constrained")
     width = 0.8 / len(_METHODS)
     for i, (name, (label, colour)) in enumerate(_METHODS.items()):
@@ -32,5 +37,6 @@ def draw(path: Path, trials: Mapping[str, Mapping[str, Mapping[str, float]]]) ->
     axis.set_ylabel("orientation error over movement, rms, °")
     axis.spines[["top", "right"]].set_visible(False)
     axis.legend(frameon=False, fontsize=9, ncols=2)
-    figure.savefig(path, dpi=110)
+    figure.savefig(out / "navigate.png", dpi=110)
     plt.close(figure)
+    return {}

@@ -20,32 +20,32 @@ _DISTANCES = ("position_m", "outage_rms_m", "outage_final_m")
 
 def tables(results: dict[str, Any]) -> dict[str, str]:
     """Orientation errors by method and trial, magnetometers, and what fixes alone show of a flight."""
-    return {
+    found = {
         "on line": _methods(results["broad"], _ON_LINE),
         "off line": _methods(results["broad"], _OFF_LINE),
         "magnetometer": _magnetometers(results["broad"]),
-        "flights": _flights(results["ansfl"]),
     }
+    return found | ({"flights": _flights(results["ansfl"])} if "ansfl" in results else {})
 
 
 def _methods(of: dict[str, Any], methods: dict[str, str]) -> str:
     trials = of["trials"]
     header = ["orientation error, °", *(name.replace("_", " ") for name in trials), "mean"]
-    rows = [
-        [words, *(f"{one['rmse_deg'][name]['total']:.2f}" for one in trials.values()), f"{of['mean_total_deg'][name]:.2f}"]
-        for name, words in methods.items()
-    ]
+    rows = []
+    for name, words in methods.items():
+        totals = [*(one["rmse_deg"][name]["total"] for one in trials.values()), of["mean_total_deg"][name]]
+        rows.append([words, *(f"{total:.2f}" for total in totals)])
     return table(header, rows)
 
 
 def _magnetometers(of: dict[str, Any]) -> str:
-    header = ["trial", "delay, ms", "spread of the strength, as read", "calibrated", "s for the command"]
+    header = ["trial", "delay, ms", "spread of the strength, as read", "calibrated"]
     rows = []
     for name, one in of["trials"].items():
         field = one["magnetometer"]
         delay = f"{1e3 * field['delay']:.1f} ± {1e3 * field['delay_std']:.1f}"
         spread = [f"{100.0 * field[when]:.1f} %" for when in ("before", "after")]
-        rows.append([name.replace("_", " "), delay, *spread, f"{one['seconds']:.0f} for {one['duration']:.0f}"])
+        rows.append([name.replace("_", " "), delay, *spread])
     return table(header, rows)
 
 
@@ -58,4 +58,5 @@ def _flights(of: dict[str, Any]) -> str:
         "outage_rms_m": "position over 10 s without fixes, m", "outage_final_m": "the same at the end, m",
     }  # fmt: skip
     shown = lambda column, key: f"{column[key]:.2f}" if key in column else "–"
-    return table(header, [[words[key], *(shown(column, key) for column in columns)] for key in (*_ATTITUDE, *_DISTANCES)])
+    rows = [[words[key], *(shown(column, key) for column in columns)] for key in (*_ATTITUDE, *_DISTANCES)]
+    return table(header, rows)

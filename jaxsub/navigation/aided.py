@@ -1,7 +1,7 @@
 r"""Strapdown navigation aided by any set of sensors, with scale errors and delays among its states.
 
-State: $[q, v, p, b_g, b_a, s_g, \tau]$, the strapdown state, the gyros' scale errors and one delay for each sensor that
-has one to be estimated. $\omega = (1 - s_g)\,\tilde\omega - b_g$. Source: Groves (2013), §14.
+State: $[q, v, p, b_g, b_a, S, \tau]$, the strapdown state, the gyros' scale errors and misalignments, and one delay for
+each sensor that has one to be estimated. $\omega = (I - S)\,\tilde\omega - b_g$. Source: Groves (2013), §4.4 and §14.
 """
 
 import abc
@@ -15,13 +15,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..arrays import Values
 from ..filter import AbstractProcess, Sample
 from .alignment import MagneticField
 from .rotation import euler, exponential, matrix, normalised, product, wrapped
 from .strapdown import Inertial, StrapdownNavigation, field_heading
 
-# states of the strapdown navigation and of the gyros' scale errors, and ways to change
-STRAPDOWN, SCALES = 16, 3
+# states of the strapdown navigation and of the gyros' matrix, and ways to change
+STRAPDOWN, SCALES = 16, 9
+# columns of the matrix in the order of its states: scale errors of x, y, z, then misalignments xy, xz, yx, yz, zx, zy
+_COLUMNS = np.array([0, 1, 2, 1, 2, 0, 2, 0, 1])
 CHANGES = STRAPDOWN - 1 + SCALES
 
 
@@ -158,7 +161,7 @@ class AidedNavigation(AbstractProcess):
         return jnp.concatenate([inner, x[STRAPDOWN:] - origin[STRAPDOWN:]])
 
     def step(self, x: Float[Array, " n"], theta: Float[Array, " p"], sample: Sample) -> Float[Array, " n"]:
-        """The strapdown step with the gyros' scale errors taken off; these and the delays stay."""
+        """The strapdown step with the gyros' matrix taken off; that and the delays stay."""
         inner = self.inertial.step(x[:STRAPDOWN], theta, _scaled(x, sample))
         return jnp.concatenate([inner, x[STRAPDOWN:]])
 
@@ -226,9 +229,20 @@ def earlier(motion: Kinematics, delay: Float[Array, ""]) -> Kinematics:
     return motion._replace(q=q, R=matrix(q), velocity=velocity, position=position)
 
 
+def scaled_rate(x: Float[Array, " n"], gyro: Float[Array, "3"]) -> Float[Array, "3"]:
+    """$(I - S)$ times the gyros' reading, rad/s: without scale errors and misalignments, with the bias."""
+    return gyro - by_matrix(x[STRAPDOWN : STRAPDOWN + SCALES], gyro)
+
+
+def by_matrix(states: Float[Values, "*k 9"], rate: Float[Values, "*k 3"]) -> Float[Values, "*k 3"]:
+    r"""$S\tilde\omega$ of the states of S and the gyros' reading, rad/s, of JAX or NumPy."""
+    parts = states * rate[..., _COLUMNS]
+    return parts[..., :3] + parts[..., 3::2] + parts[..., 4::2]
+
+
 def _scaled(x: Float[Array, " n"], sample: Sample) -> Sample:
-    """The sample for the strapdown process, its gyros' scale errors taken off."""
+    """The sample for the strapdown process, what the gyros' matrix makes of the rates taken off."""
     read = sample.inputs.inertial
-    gyro = read.gyro * (1.0 - x[STRAPDOWN : STRAPDOWN + SCALES])
+    gyro = scaled_rate(x, read.gyro)
     inertial = Inertial(gyro, read.accelerometer, read.magnetometer)
     return Sample(inertial, sample.elapsed, sample.outputs, sample.mask, sample.scale)

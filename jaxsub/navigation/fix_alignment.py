@@ -24,6 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from ..effects import GRAVITY
 from .suite import Sensor, SensorSuite
+from .suite.grades import motion_density
 from .suite.log import SensorLog, interpolated
 
 # s of the first window, and rad to which a heading is known: a filter may linearise about an attitude so far off
@@ -224,7 +225,8 @@ def _white(log: SensorLog, suite: SensorSuite) -> tuple[float, float]:
         sensor = suite.only(kind)
         assert sensor.noise is not None
         varies = float(np.std(log.complete(sensor.name)[1], axis=0).max())
-        found.append(math.hypot(sensor.noise.density, sensor.noise.motion_density * varies))
+        share = math.hypot(sensor.noise.scale_error, sensor.noise.nonlinearity)
+        found.append(math.hypot(sensor.noise.density, motion_density(share) * varies))
     return found[0], found[1]
 
 

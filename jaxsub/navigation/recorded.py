@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..recording import Recording
+from .aided import SCALES, by_matrix
 from .consistency import consistency
 from .navigate import Navigation
 from .track import MOTION, Track
@@ -17,7 +18,8 @@ _AXES = ("x", "y", "z")
 UNITS: dict[str, str] = dict(zip(MOTION, ("rad",) * 3 + ("m/s",) * 3 + ("m",) * 3, strict=True))
 UNITS |= dict.fromkeys(_RATES, "rad/s") | dict.fromkeys(_FORCES, "m/s^2")
 CONSTANTS = tuple(f"{part}_{axis}" for part in ("gyro_bias", "accelerometer_bias", "gyro_scale") for axis in _AXES)
-_OF_CONSTANTS = ("rad/s",) * 3 + ("m/s^2",) * 3 + ("1",) * 3
+CONSTANTS += tuple(f"gyro_misalignment_{a}{b}" for a in _AXES for b in _AXES if a != b)
+_OF_CONSTANTS = ("rad/s",) * 3 + ("m/s^2",) * 3 + ("1",) * 3 + ("rad",) * 6
 
 
 def recording_of(found: Navigation, track: Track) -> Recording:
@@ -46,9 +48,10 @@ def constant_names(found: Navigation) -> tuple[str, ...]:
 
 
 def _rates(found: Navigation, track: Track) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
-    constants, std = np.asarray(track.constants), np.asarray(track.constants_std)
-    values = (1.0 - constants[:, 6:9]) * found.rows.rates - constants[:, :3]
-    wide = std[:, :3] ** 2 + (std[:, 6:9] * found.rows.rates) ** 2
+    constants, std, read = np.asarray(track.constants), np.asarray(track.constants_std), found.rows.rates
+    scales = slice(6, 6 + SCALES)
+    values = read - by_matrix(constants[:, scales], read) - constants[:, :3]
+    wide = std[:, :3] ** 2 + by_matrix(std[:, scales] ** 2, read**2)
     return _RATES, values, np.sqrt(wide + _white(found, "gyro") ** 2)
 
 

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
+from scipy.integrate import cumulative_trapezoid
 
 from ..errors import InputError
 from ..filter import Sample
@@ -21,6 +22,8 @@ from .suite.log import SensorLog, interpolated
 _SPARSE, _LEAST_GAP = 5.0, 0.1
 # s for which a motion that was not read goes on as it is, in reckoning what it may have become
 _LASTING = 0.5
+# standard deviations of the gyros' bias below which a smoothed rate shows no turn, and s over which it is smoothed
+_TURNING, _SMOOTHED = 3.0, 1.0
 # samples in a row at one and the same extreme that show a sensor at its stop, and the extreme's size in the usual ones
 _STUCK, _FAR = 5, 4.0
 
@@ -57,8 +60,9 @@ def rows_of(log: SensorLog, suite: SensorSuite) -> Rows:
     forces, force, force_std = _driving(log, accelerometer, findings)
     magnetometer = np.zeros_like(rate)
     outputs, masks, scales, used = [], [], [], {}
+    straight = _without_turns(log, gyro, rates)
     for sensor in suite.aiding:
-        values, scale = _measured(log, sensor)
+        values, scale = _measured(log, sensor, straight)
         mask = np.all(np.isfinite(values), axis=1)
         used[sensor.name] = int(mask.sum())
         if sensor.kind == "magnetometer":
@@ -160,8 +164,26 @@ def _gap_lengths(times: np.ndarray, good: np.ndarray) -> np.ndarray:
     return np.where(length > max(_SPARSE * usual, _LEAST_GAP), length, 0.0)
 
 
-def _measured(log: SensorLog, sensor: Sensor) -> tuple[np.ndarray, np.ndarray]:
-    """Measurements (K, n) in the row nearest to when each was taken, and their noise in terms of the stated one."""
+def _without_turns(log: SensorLog, gyro: Sensor, rates: np.ndarray) -> np.ndarray:
+    """(K,) s, length of the time about each row in which the vehicle does not turn; zero where it does."""
+    assert gyro.noise is not None
+    times = log.times
+    turned = cumulative_trapezoid(np.linalg.norm(rates, axis=1), times, initial=0.0)
+    first, last = (np.clip(times + sign * 0.5 * _SMOOTHED, times[0], times[-1]) for sign in (-1.0, 1.0))
+    smoothed = (np.interp(last, times, turned) - np.interp(first, times, turned)) / np.maximum(last - first, 1e-9)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], smoothed < _TURNING * gyro.noise.bias, [False]])))
+    length = np.zeros(len(times))
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        length[begin:end] = times[end - 1] - times[begin]
+    return length
+
+
+def _measured(log: SensorLog, sensor: Sensor, straight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Measurements (K, n) in the row nearest to when each was taken, and their noise in terms of the stated one.
+
+    An error of a field's heading comes of the place and of what turns with the sensor: it lasts for as long as the
+    vehicle goes `straight` (K,), s.
+    """
     read, times = log.readings[sensor.name], log.times
     whole = np.flatnonzero(np.isfinite(read).all(axis=1))
     if sensor.rate > 0.0:
@@ -175,7 +197,10 @@ def _measured(log: SensorLog, sensor: Sensor) -> tuple[np.ndarray, np.ndarray]:
     scale = np.ones(len(times))
     if sensor.correlation > 0.0 and len(row):
         between = np.diff(times[row], prepend=times[row[0]] - sensor.correlation)
-        scale[row] = np.sqrt(np.maximum(2.0 * sensor.correlation / np.maximum(between, 1e-9), 1.0))
+        lasting = 2.0 * sensor.correlation
+        if sensor.kind in ("magnetometer", "compass"):
+            lasting = np.maximum(lasting, straight[row])
+        scale[row] = np.sqrt(np.maximum(lasting / np.maximum(between, 1e-9), 1.0))
     return values, scale
 
 

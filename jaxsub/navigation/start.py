@@ -31,7 +31,7 @@ class Start(NamedTuple):
 
     **Fields**
 
-    - `x`: (19,) state without delays. `std`: (18,) of its changes. `rest`: whether the unit is still at first.
+    - `x`: (25,) state without delays. `std`: (24,) of its changes. `rest`: whether the unit is still at first.
     - `heading`: `measured`, `by fixes`, `unknown` (fixes do not show it) or `relative` (it counts from the start).
     """
 
@@ -75,7 +75,8 @@ def start_of(log: SensorLog, suite: SensorSuite) -> Start:
         bias, bias_std = rates.mean(axis=0), min(bias_std, gyro.noise.density / math.sqrt(_WINDOW) + 7.3e-5)
     known = {"tilt_std": tilt} if rest else {}
     by_fixes = aligned_by_fixes(log, suite, q, bias, bias_std, **known) if heading == "unknown" else None
-    std = np.repeat([tilt, slow, place, bias_std, accelerometer.noise.bias, max(gyro.noise.scale_error, 1e-6)], 3)
+    sizes = [tilt, slow, place, bias_std, accelerometer.noise.bias, max(gyro.noise.scale_error, 1e-6)]
+    std = np.repeat(sizes, [3, 3, 3, 3, 3, SCALES])
     std[2] = turn
     if by_fixes is not None:
         # the filter is given the same fixes again: biases are as beforehand, and of the attitude, which is wider, nine

@@ -33,6 +33,7 @@ from .rows import sigmas
 from .start import Start, field_of
 from .strapdown import SensorNoise, StrapdownNavigation
 from .suite import Sensor, SensorSuite
+from .suite.grades import motion_density
 from .suite.log import SensorLog
 
 # of an adaptive rule's least noise, its most
@@ -71,8 +72,9 @@ def filter_of(
     noise = SensorNoise(
         gyro.noise.density if adds else 0.0,
         accelerometer.noise.density if adds else 0.0,
-        gyro.noise.motion_density,
-        accelerometer.noise.motion_density,
+        motion_density(gyro.noise.nonlinearity),
+        # of the accelerometers' scales there are no states
+        motion_density(math.hypot(accelerometer.noise.scale_error, accelerometer.noise.nonlinearity)),
         math.inf,
     )
     inertial = StrapdownNavigation(noise) if field is None else StrapdownNavigation(noise, field)

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from ..arrays import Values
 from ..filter import Sample, Smoothed
-from .aided import SCALES, STRAPDOWN
+from .aided import scaled_rate
 from .rotation import euler, matrix
 
 MOTION = ("phi", "theta", "psi", "u", "v", "w", "x", "y", "z")
@@ -19,8 +19,8 @@ class Track(eqx.Module):
 
     - `motion`: (K, 9) of `MOTION`: rad, m/s in body axes, m NED; `motion_std`: its standard deviations.
     - `q`: (K, 4) attitude. `turn_std`: (K, 3) rad, of its error about north, east and down.
-    - `constants`: (K, 9 + delays) biases of gyros (rad/s) and accelerometers (m/s²), scale errors of the gyros, delays
-      (s); `constants_std`: their standard deviations.
+    - `constants`: (K, 15 + delays) biases of gyros (rad/s) and accelerometers (m/s²), the gyros' scale errors and
+      misalignments (rad), delays (s); `constants_std`: their standard deviations.
     """
 
     motion: Float[Values, "*k 9"]
@@ -45,7 +45,7 @@ class Shown(eqx.Module):
         x, P = known.x, known.covariance
         R, v = matrix(x[:4]), x[4:7]
         angles = euler(x[:4])
-        rate = (1.0 - x[STRAPDOWN : STRAPDOWN + SCALES]) * sample.inputs.inertial.gyro - x[10:13]
+        rate = scaled_rate(x, sample.inputs.inertial.gyro) - x[10:13]
         velocity, position = R.T @ v - jnp.cross(rate, self.arm), x[7:10] - R @ self.arm
         none = jnp.zeros((3, 3), x.dtype)
         by_turn = jnp.concatenate([_angles_by_turn(angles), R.T @ _cross(v), _cross(R @ self.arm)])

@@ -92,3 +92,25 @@ def test_repeated_and_backward_rows_are_left_out_of_a_file(tmp_path):
     (tmp_path / "back.csv").write_text(f"t,a,b,c,d,e,f\n{back}")
     with pytest.raises(InputError, match="sort the rows"):
         load_sensors(tmp_path / "back.csv", suite_of(INERTIAL))
+
+
+def test_an_interval_is_driven_by_the_mean_of_its_ends_or_by_the_reading_at_its_end():
+    """Claim: `sampling` decides which, for the gyros alone where it is theirs."""
+    for sampling in ("point", "mean"):
+        made, plain = rows(gyro=f"sampling = '{sampling}'")
+        driven = made.samples.inputs.inertial
+        ends = plain["a"][1:] if sampling == "mean" else 0.5 * (plain["a"][1:] + plain["a"][:-1])
+        np.testing.assert_allclose(driven.gyro[1:, 0], ends)
+        np.testing.assert_allclose(driven.accelerometer[1:, 0], 0.5 * (plain["d"][1:] + plain["d"][:-1]))
+
+
+def test_a_fields_error_lasts_for_as_long_as_nothing_turns():
+    """Claim: ten seconds of rest count as one measurement in ten seconds, and a turn as white noise of the time."""
+    times = 0.01 * np.arange(2000)
+    turns = np.where(times < 10.0, 0.0, 1.0)
+    field = dict.fromkeys("xyz", 1.0 + 0.01 * np.random.default_rng(5).normal(size=2000))
+    text = "[sensors.magnetometer]\ncolumn=['x','y','z']\ncorrelation=1.0\n"
+    made, _ = rows(field | {"a": turns, "b": 0.0 * turns, "c": 0.0 * turns}, text, times)
+    scale = np.asarray(made.samples.scale)[:, 0]
+    np.testing.assert_allclose(scale[100:900], np.sqrt(9.5 / 0.01), rtol=0.02)
+    np.testing.assert_allclose(scale[1100:], np.sqrt(2.0 / 0.01), rtol=1e-6)

@@ -41,7 +41,9 @@ def _triad(value: T) -> dict[str, T]:
     return {axis: value for axis in _AXES}  # noqa: C420
 
 
-_INERTIAL = ("grade", "density", "bias", "wander", "scale_error", "range", "sampling", "mounting")
+_INERTIAL = (
+    "grade", "density", "bias", "wander", "scale_error", "nonlinearity", "range", "sampling", "mounting",
+)  # fmt: skip
 _AIDING = ("sigma", "correlation", "delay", "rate")
 
 KINDS: dict[str, Kind] = {
