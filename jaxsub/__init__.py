@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .effects import vocabulary
     from .errors import InputError
     from .information import Identifiability
+    from .monitoring import Watcher
     from .recording import Recording, Selection, from_pandas, from_xarray, hold_out, load, save, split
     from .simulation import doublet, prbs, synthetic, three_two_one_one
     from .vehicle import Model, initial_file, own_model, read_vehicle, vehicle_from, vehicle_text, write_vehicle
@@ -38,6 +39,7 @@ __all__ = [
     "Simulation",
     "States",
     "Sweep",
+    "Watcher",
     "__version__",
     "check",
     "diagnose",
@@ -80,6 +82,7 @@ _NAMES = {
     "effects": "vocabulary",
     "errors": "InputError",
     "information": "Identifiability",
+    "monitoring": "Watcher",
     "recording": "Recording Selection from_pandas from_xarray hold_out load save split",
     "simulation": "doublet prbs synthetic three_two_one_one",
     "vehicle": "Model initial_file own_model read_vehicle vehicle_from vehicle_text write_vehicle",

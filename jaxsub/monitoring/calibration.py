@@ -33,6 +33,8 @@ HOURS, _SIDE_BY_SIDE = 100.0, 25
 _MOST = 8_000_000
 # peaks that the tail is fitted to, and the fewest
 _PEAKS, _FEWEST = 400, 30
+# times the quiet time, of the usual time between two peaks
+_APART = 10
 # parts of the quiet time in which the largest statistic is kept
 _PARTS = 6
 # samples along which the filter is linearised
@@ -223,7 +225,8 @@ def tail_of(series: Float[np.ndarray, "b parts"], duration: float, rate: float) 
     The level is as high as leaves enough peaks to fit, or twice those of the `rate` per hour that is asked for.
     """
     hours = series.size * duration / 3600.0
-    wanted = min(max(_PEAKS, 2.0 * rate * hours), 0.2 * series.size)
+    # at a low level alarms run into each other, and the peak of many is no peak of one
+    wanted = min(max(min(_PEAKS, series.size / (_APART * _PARTS)), 2.0 * rate * hours), 0.2 * series.size)
     low, high = 0.0, float(series.max())
     # counts fall with the level once that is above the bulk
     low = float(np.median(series))

@@ -15,6 +15,7 @@ from ..recording import Recording
 from ..vehicle import AbstractVehicle
 from .calibration import HOURS, Tail, calibrated, calibrated_white
 from .monitor import Monitor, MonitorState, Observation
+from .naming import NAMED_AT, Recent, named_effects
 from .setup import LONGEST, WatchedModel, initial_state, model_by_noise, model_of, monitor_of, rows_of
 from .stored import Stored, read_stored, write_stored
 
@@ -37,6 +38,7 @@ class Watcher:
     - `rate`: false alarms per hour.
     - `state`: before the next row. `samples`: rows so far. `alarms`: alarms so far. `time`: s, of the last row used.
     - `place`, `since`, `reported`: of the alarm that stands: where, since when (s), and the statistic last reported.
+    - `recent`: the last rows. `named`: how often the alarm that stands was named.
     """
 
     model: WatchedModel
@@ -50,6 +52,8 @@ class Watcher:
     place: str = ""
     since: float = float("nan")
     time: float = float("nan")
+    recent: Recent = dataclasses.field(default_factory=Recent)
+    named: int = 0
 
     def __post_init__(self) -> None:
         row = np.zeros(1 + len(self.monitor.held) + self.monitor.sigma.size)
@@ -103,13 +107,25 @@ class Watcher:
         if not found.taken:
             return []
         self.time = float(row[0])
-        return self._events(found)
+        self.recent.add(np.array(row), found.estimate.x[: len(self.model.start_std)])
+        return [*self._events(found), *self._names()]
+
+    def _names(self) -> list[Event]:
+        """An event that names the effects of the alarm that stands, whenever there is much more evidence."""
+        if not self.place or self.named == len(NAMED_AT) or not self.recent.full:
+            return []
+        if self.recent.since(self.since) < NAMED_AT[self.named]:
+            return []
+        self.named += 1
+        effects = named_effects(self.model, self.recent, self.since)
+        return [{"event": "named", "alarm": self.alarms, "time": self.time, "effects": effects}]
 
     def _events(self, found: Observation) -> list[Event]:
         events: list[Event] = []
         standing = self.place != ""
         if found.raised:
             self.alarms += 1
+            self.named = 0
         channels = self.model.vehicle.layout.channels
         jumped = [f"sensor:{name}" for name, there in zip(channels, found.recovered, strict=True) if there]
         statistic = float(found.statistic)
@@ -182,9 +198,12 @@ class Watcher:
             "since": self.since,
             "time": self.time,
             "tail": list(self.tail),
+            "named": self.named,
+            "recent": len(self.recent.rows),
         }
         arrays = [np.asarray(leaf) for leaf in jax.tree.leaves((self.current(), self.monitor.test))]
-        write_stored(path, Stored(self.model, numbers | more, arrays))
+        kept = [*self.recent.rows, *self.recent.states]
+        write_stored(path, Stored(self.model, numbers | more, [*arrays, np.concatenate([np.zeros(0), *kept])]))
 
     @classmethod
     def restored(cls, path: Path, vehicle: AbstractVehicle) -> tuple["Watcher", dict[str, Any]]:
@@ -200,5 +219,14 @@ class Watcher:
         state, test = jax.tree.unflatten(structure, [jnp.asarray(own) for own in found.arrays[: len(leaves)]])
         monitor = dataclasses.replace(monitor, test=test)
         tail, rate = Tail(*numbers.pop("tail")), numbers.pop("rate")
-        own = {name: numbers.pop(name) for name in ("samples", "alarms", "reported", "place", "since", "time")}
+        own = {name: numbers.pop(name) for name in ("samples", "alarms", "reported", "place", "since", "time", "named")}
+        own["recent"] = _recent(found, numbers.pop("recent"))
         return cls(found.model, monitor, tail, rate, state, **own), numbers
+
+
+def _recent(found: Stored, count: int) -> Recent:
+    """The rows and states that a file keeps last, `count` of each."""
+    states = len(found.model.start_std)
+    flat = found.arrays[-1]
+    rows, kept = np.split(flat, [flat.size - count * states])
+    return Recent(list(rows.reshape(count, -1)) if count else [], list(kept.reshape(count, states)))
