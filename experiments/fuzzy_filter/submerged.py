@@ -102,11 +102,14 @@ def run(out: Path, quick: bool) -> dict:
     cases = {(name, size): {name: scale} for name in EFFECTS for size, scale in _SIZES.items()}
     # one batch, so that one program is compiled
     missing = joined([recorded(vehicle, sizes, count) for sizes in cases.values()])
+    copies = _COPIES + _CLEAN_TESTS
     results: dict = {"runs": count, "copies": _COPIES, "false_alarm": {}, "effects": {name: {} for name in EFFECTS}}
     for detector, statistic in {"fuzzy_q": noise_densities, "nis_constant": innovation_squares}.items():
         # the last of the copies play the part of recordings
-        clean = np.asarray(statistic(vehicle, inputs, at_rest(vehicle, count), sigma, _COPIES + _CLEAN_TESTS)[0])
-        every = np.asarray(statistic(vehicle, missing, at_rest(vehicle, len(missing.times)), sigma, 0)[1])
+        clean = np.asarray(statistic(vehicle, inputs, at_rest(vehicle, count), sigma, noise(inputs, copies))[0])
+        every = np.asarray(
+            statistic(vehicle, missing, at_rest(vehicle, len(missing.times)), sigma, noise(missing, 0))[1]
+        )
         results["false_alarm"][detector] = false_alarm(clean)
         found = {}
         for case, part in zip(cases, np.split(every, len(cases)), strict=True):
@@ -118,6 +121,11 @@ def run(out: Path, quick: bool) -> dict:
             shown = {name: found[name, "whole"] for name in _SHOWN}
             draw(shown, clean, vehicle.layout.equations, out / "submerged_process_noise.png")
     return results
+
+
+def noise(runs: Runs, copies: int) -> np.ndarray:
+    """(m, R, K, c) noise of unit size for so many `copies` of the runs."""
+    return np.random.default_rng(0).standard_normal((copies, *runs.outputs.shape))
 
 
 def joined(parts: list[Runs]) -> Runs:
@@ -140,8 +148,8 @@ def recorded(vehicle: SubmergedBody, sizes: dict[str, float], count: int) -> Run
     runs = stack(("acts",))
     shown = np.asarray(measure(truth, runs, sampled_states(truth, runs, at_rest(vehicle, len(driven)))))
     sigma = np.array([output.sigma for output in layout.outputs])
-    noise = np.stack([np.random.default_rng([7, seed]).normal(size=shown.shape[1:]) for seed in range(count)])
-    return dataclasses.replace(stack(()), outputs=jnp.asarray(shown + sigma * noise), mask=jnp.ones(shown.shape, bool))
+    own = np.stack([np.random.default_rng([7, seed]).normal(size=shown.shape[1:]) for seed in range(count)])
+    return dataclasses.replace(stack(()), outputs=jnp.asarray(shown + sigma * own), mask=jnp.ones(shown.shape, bool))
 
 
 def driving(vehicle: SubmergedBody, seed: int) -> Recording:
@@ -154,10 +162,9 @@ def driving(vehicle: SubmergedBody, seed: int) -> Recording:
 
 @eqx.filter_jit
 def innovation_squares(
-    vehicle: SubmergedBody, runs: Runs, start: Array, sigma: Array, copies: int
+    vehicle: SubmergedBody, runs: Runs, start: Array, sigma: Array, draws: Array
 ) -> tuple[Array, Array]:
     """Squares of the velocities' normalised innovations with constant noise, as `noise_densities` gives densities."""
-    draws = jax.random.normal(jax.random.key(1), (copies, *runs.outputs.shape))
     outputs = jnp.concatenate([simulate(vehicle, runs, start) + sigma * draws, runs.outputs[None]])
     adaptive = noise_filter(vehicle, runs.substeps, sigma)
     assert isinstance(adaptive.noise, Above)

@@ -23,6 +23,7 @@ from ..estimate import Solution
 from ..filter import (
     AbstractNoiseRule,
     ConstantNoise,
+    Covariance,
     ExtendedKalmanFilter,
     FilterState,
     FuzzyNoise,
@@ -88,7 +89,9 @@ def noise_signals(fit: Solution, recordings: Sequence[Recording], copies: int = 
     vehicle = fit.vehicle
     if any(isinstance(effect, AbstractActuator) for effect in vehicle.effects):
         return []
-    densities = noise_densities(vehicle, fit.runs, fit.start, fit.sigma, copies)
+    # by NumPy: to compile a generator of random numbers takes seconds
+    draws = np.random.default_rng(_SEED).standard_normal((copies, *fit.runs.outputs.shape))
+    densities = noise_densities(vehicle, fit.runs, fit.start, fit.sigma, draws)
     clean, recorded = (np.asarray(density) for density in densities)
     lengths = np.asarray(fit.runs.live).sum(1) + 1
     if not (np.isfinite(clean).all() and np.isfinite(recorded).all() and lengths.min() > NOISE_WINDOW // 2):
@@ -178,7 +181,8 @@ def noise_filter(vehicle: AbstractVehicle, substeps: int, sigma: Float[Array, " 
     rule = Above(constant, FuzzyNoise(least * scale, most * scale))
     # the start that a fit found has missing physics in it: the filter takes its own from the first samples
     begin = jnp.diag(PRIOR_WIDTH * scale)
-    return ExtendedKalmanFilter(VehicleProcess.of(known, substeps), rule, jnp.diag(sigma), begin)
+    # updated by covariances, whose program compiles in three quarters of the time
+    return ExtendedKalmanFilter(VehicleProcess.of(known, substeps), rule, jnp.diag(sigma), begin, Covariance())
 
 
 def floor(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values, " n"]:
@@ -188,13 +192,17 @@ def floor(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values,
 
 @compiled
 def noise_densities(
-    vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s"], sigma: Float[Array, " c"], copies: int
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    start: Float[Array, "r s"],
+    sigma: Float[Array, " c"],
+    draws: Float[Values, "m r k c"],
 ) -> tuple[Float[Array, "m r k n"], Float[Array, "r k n"]]:
-    """The rule's part of Q_ii a second of the n equations, for m clean `copies` of R runs and for the runs themselves.
+    """The rule's part of Q_ii a second of the n equations, for m clean copies of R runs and for the runs themselves.
 
-    `start` is the state at each run's first sample, `sigma` the sensors' noise, both SI; NaN once a filter diverged.
+    `start` is the state at each run's first sample, `sigma` the sensors' noise, both SI, and `draws` the copies' noise
+    in units of it; NaN once a filter diverged.
     """
-    draws = jax.random.normal(jax.random.key(_SEED), (copies, *runs.outputs.shape), runs.outputs.dtype)
     outputs = jnp.concatenate([simulate(vehicle, runs, start) + sigma * draws, runs.outputs[None]])
     filter, beneath = noise_filter(vehicle, runs.substeps, sigma), floor(vehicle, sigma)
 

@@ -157,7 +157,9 @@ def _looked_at(vehicle_at: VehicleAt, y: Array, runs: Runs) -> tuple[Sampled, Ar
     """
     model_at = lambda y: Sampled.of(vehicle_at(y), runs)
     vehicle, layout = vehicle_at(y), vehicle_at(y).layout
-    states = jax.random.normal(jax.random.key(0), (*runs.times.shape, len(layout.equations) + len(layout.positions)))
+    size = (*runs.times.shape, len(layout.equations) + len(layout.positions))
+    # by NumPy: to compile a generator of random numbers takes seconds
+    states = jnp.asarray(np.random.default_rng(0).standard_normal(size))
     one = lambda time, state, signals: vehicle.measure(time[None], state[None], signals[None])[0]
     alone = jax.vmap(jax.vmap(one))(runs.times, states, runs.signals)
     alike = jnp.allclose(alone, vehicle.measure(runs.times, states, runs.signals), equal_nan=True)

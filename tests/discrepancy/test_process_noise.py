@@ -57,13 +57,14 @@ def fitted(runs):
     return fit(vehicle, runs)
 
 
-@pytest.mark.parametrize("equation", EQUATIONS)
+@pytest.mark.parametrize("equation", ["pitch", pytest.param("heave", marks=pytest.mark.long)])
 def test_it_rises_in_the_equation_and_at_the_time(equation):
     runs = recorded(equation, 1)
     clean, missing = noise_signals(fitted(runs), runs)
     assert (clean.run, clean.ranked()) == ("run0", [])
     assert missing.ranked()[0] == equation
-    ((start, end),) = missing.intervals(equation)
+    # elsewhere, too, it rises by chance once in twenty runs
+    ((start, end),) = [(a, b) for a, b in missing.intervals(equation) if a < EVENT[1] and b > EVENT[0]]
     assert abs(start - EVENT[0]) < missing.window
     assert abs(end - EVENT[1]) < missing.window
     # Q_ii itself, above its constant part

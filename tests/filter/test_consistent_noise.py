@@ -64,7 +64,7 @@ def steady_nis(found) -> float:
     return float(jnp.mean(nis[:, -SAMPLES // 3 :]))
 
 
-@pytest.mark.parametrize("wrong", [0.2, 1.0, 5.0])
+@pytest.mark.parametrize("wrong", [0.2, pytest.param(1.0, marks=pytest.mark.long), 5.0])
 def test_a_density_that_is_wrong_fivefold_either_way_ends_consistent(wrong):
     samples, _ = runs()
     density = wrong * jnp.array([ANGLE, BIAS])

@@ -24,7 +24,7 @@ from rigs import oscillator, recorded
 from jaxsub.discrepancy.process_noise import noise_densities
 vehicle = oscillator()
 runs = recorded(vehicle, 1, 12, 0.1, seed=1)
-noise_densities(vehicle, runs, jnp.zeros((1, 2)), jnp.array([0.01, 0.02]), 1)
+noise_densities(vehicle, runs, jnp.zeros((1, 2)), jnp.array([0.01, 0.02]), jnp.ones((1, *runs.outputs.shape)))
 """
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system pins no process to a core")
