@@ -18,7 +18,10 @@ def told(name, run):
     return [finding for kind in KINDS for finding in found(checked, kind)]
 
 
-@pytest.mark.parametrize("name", ["nps", "remus", "dsrv", "oscillator", "coupled", "body"])
+@pytest.mark.parametrize(
+    "name",
+    [*("dsrv", "oscillator", "coupled", "body"), *(pytest.param(n, marks=pytest.mark.long) for n in ("nps", "remus"))],
+)
 def test_clean_runs_agree(name):
     for seed in range(10, 22):
         assert [finding.line() for finding in told(name, clean(name, seed))] == []

@@ -73,7 +73,14 @@ def test_short_commands_take_an_accelerator_only_where_it_is_named(given, long, 
     assert done.stdout == f"{expected}\n", done.stderr
 
 
-@pytest.mark.parametrize("damage", [lambda entry: entry[: len(entry) // 2], lambda entry: b"", lambda entry: b"x" * 99])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda entry: entry[: len(entry) // 2],
+        pytest.param(lambda entry: b"", marks=pytest.mark.long),
+        pytest.param(lambda entry: b"x" * 99, marks=pytest.mark.long),
+    ],
+)
 def test_damaged_programs_are_replaced_with_one_note(tmp_path, damage):
     assert ran(XDG_CACHE_HOME=str(tmp_path)) == ""
     entries = sorted(tmp_path.rglob("*-cache"))
@@ -87,6 +94,7 @@ def test_damaged_programs_are_replaced_with_one_note(tmp_path, damage):
     assert ran(XDG_CACHE_HOME=str(tmp_path)) == ""
 
 
+@pytest.mark.long
 def test_set_up_twice_the_damage_is_said_once(tmp_path):
     ran(XDG_CACHE_HOME=str(tmp_path))
     for entry in tmp_path.rglob("*-cache"):

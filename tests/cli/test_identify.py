@@ -67,6 +67,7 @@ def test_coefficients_come_with_errors_and_verdicts(files, monkeypatch, capsys, 
     )
 
 
+@pytest.mark.long
 def test_coefficients_that_only_a_ratio_of_is_told_are_said_so_with_a_remedy(files, monkeypatch, capsys):
     text = (files / "vehicle.toml").read_text(encoding="utf-8")
     assert "I_x" not in text

@@ -52,6 +52,7 @@ def told(monkeypatch, capsys, folder, *options, **others):
     return json.loads(said.out)
 
 
+@pytest.mark.long
 def test_the_error_is_that_of_a_fit_and_of_a_search(rig, monkeypatch, capsys):
     """Claim: from the estimated start rms/σ is `fit`'s with every coefficient fixed, and a search's of the start."""
     found = told(monkeypatch, capsys, rig)

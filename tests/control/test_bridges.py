@@ -108,6 +108,7 @@ np.savez({out!r}, rows=np.array(rows), A=A, B=B, slope=slope, states=plant.state
 """
 
 
+@pytest.mark.long
 def test_exported_plant_runs_where_there_is_only_jax(tmp_path):
     plant = discretise(remembering(), DT)
     path, inputs = tmp_path / "nps.plant", 0.1 * np.sign(np.random.default_rng(1).standard_normal((25, 3)))

@@ -77,7 +77,7 @@ def test_plan_is_the_optimum_that_ipopt_finds(plant, mpc, hard):
     assert np.abs(peer).max() == pytest.approx(0.3, rel=1e-4)  # limits are active
 
 
-@pytest.mark.parametrize("most", [1, 2])
+@pytest.mark.parametrize("most", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_plan_that_is_cut_short_keeps_the_limits_of_its_inputs(mpc, hard, most):
     short = Mpc(mpc.plant, mpc.weights, mpc.nodes, 0.0, most)
     y, solved = eqx.filter_jit(short.solve)(hard, jnp.zeros(18))

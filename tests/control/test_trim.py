@@ -62,6 +62,7 @@ def test_trim_is_the_one_that_scipy_finds_in_the_equations_of_motion(plant, foun
     np.testing.assert_allclose(found.u, w[4:7], atol=1e-8)
 
 
+@pytest.mark.long
 def test_derivatives_of_a_trim_are_those_of_finite_differences(plant):
     names = ("M_delta_e", "N_delta_r", "trim-offset[x].delta_x_B")
     values = {name: plant.vehicle.values()[name] for name in names}

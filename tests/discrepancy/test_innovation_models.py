@@ -95,6 +95,7 @@ def test_a_free_run_begun_anew_is_the_motion_itself_where_nothing_is_wrong():
     assert np.max(err) > 0.1
 
 
+@pytest.mark.long
 def test_runs_are_cut_as_often_as_a_model_does_not_run_free_and_no_more():
     """Claim: free runs in the pieces chosen leave less than a tenth of the variance, and in half as many more."""
     view = view_of_truth()
@@ -109,6 +110,7 @@ def test_runs_are_cut_as_often_as_a_model_does_not_run_free_and_no_more():
     assert pieces == 1 or left(pieces // 2) > 0.1
 
 
+@pytest.mark.long
 def test_a_view_that_lacks_an_effect_is_that_of_the_vehicle_without_it():
     """Claim: of a small effect the residual's squares are those of a filter without it."""
     vehicle, runs = true_pendulum().with_effect(CubicDamping("x", jnp.asarray(0.0))), batch(pendulum(), steered()[:2])

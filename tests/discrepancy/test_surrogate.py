@@ -180,6 +180,7 @@ def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, er
     assert started == [True, False][: 1 + holds]
 
 
+@pytest.mark.long
 def test_numbers_that_are_held_stay_through_every_search():
     """Claim: a moment that is held is the same after a fit with a drag more, which begins at the file's numbers too."""
     runs = batch(wrong(), recorded(HullAsymmetry("pitch", 300.0), 2)[:2])

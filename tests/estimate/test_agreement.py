@@ -41,7 +41,10 @@ SURE["mekf, then gauss_newton"] = lambda: Chain(mekf(), gauss_newton())
 SURE["global"] = lambda: Global(gauss_newton(), span=0.8, generations=40)
 
 
-@pytest.mark.parametrize("name", SURE)
+LONG = {"newton_eq10", "gradient", "mekf, then gauss_newton"}
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.long] if n in LONG else []) for n in SURE])
 def test_estimator_ends_at_the_optimum(problem, best, name):
     start = scattered(problem, 0.2, 1, seed=9)
     found = SURE[name]().run(problem, start)

@@ -26,6 +26,7 @@ def judged(residual, **options):
     return assess_residuals(NAMES, residual, everywhere(residual), **options)
 
 
+@pytest.mark.long
 def test_white_residuals_of_right_size_are_rarely_rejected():
     """Claim: each test's false alarms over 1000 records are no more than twice the level, at 1 %; p-values spread."""
     found = [judged(noise(seed)) for seed in range(1000)]

@@ -47,6 +47,7 @@ def test_a_run_is_stepped_as_finely_as_its_damping_asks_and_no_finer(fitted):
     assert steps == [1, 1, 4, FINEST]
 
 
+@pytest.mark.long
 def test_with_the_steps_that_it_asks_for_fast_damping_is_followed_to_the_noise():
     """Claim: damping of 25 1/s leaves the noise at eight steps in 0.2 s; at one half as much more, or no number."""
     truth = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-40.0)))
@@ -128,6 +129,7 @@ def test_a_file_with_fast_damping_is_simulated_as_finely_as_it_asks():
     assert batch(oscillator().with_effect(QuadraticDamping("x", jnp.asarray(1e3))), [given]).substeps == 1
 
 
+@pytest.mark.long
 def test_a_coefficient_asks_for_the_steps_that_its_effect_asks_for():
     """Claim: square damping of heave needs several steps a sample, whether it is an effect or a coefficient."""
     plain = vehicle_from(

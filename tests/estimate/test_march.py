@@ -103,7 +103,8 @@ CASES = {
     "turns": lambda: turning(problem(body(), lengths=(30, 20), amplitude=0.3)),
     "every effect": lambda: problem(laden(), lengths=(6, 5), amplitude=0.02),
 }
-PARAMS = [pytest.param(case, marks=[pytest.mark.long] * (case in ("turns", "every effect"))) for case in CASES]
+LONG = ("turns", "every effect", "raw channels", "derivatives", "known start")
+PARAMS = [pytest.param(case, marks=[pytest.mark.long] * (case in LONG)) for case in CASES]
 
 
 @pytest.fixture(scope="module", params=PARAMS)
@@ -139,6 +140,7 @@ def test_a_member_says_the_same_whoever_is_beside_it(both, count):
     close(jax.jit(jax.vmap(fast.expand))(y[:count]), jax.lax.map(fast.expand, y[:count]))
 
 
+@pytest.mark.long
 def test_batches_of_batches_and_recordings_of_their_own():
     made = problem(coupled())
     fast = made.in_c()

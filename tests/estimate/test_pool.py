@@ -100,7 +100,7 @@ assert max(float(jnp.max(jnp.abs(end))) for end in ends) < 1e-3
 """
 
 
-@pytest.mark.parametrize("curvature", ["jnp.asarray", "parts"])
+@pytest.mark.parametrize("curvature", ["parts", pytest.param("jnp.asarray", marks=pytest.mark.long)])
 def test_two_programs_of_searches_at_a_time_end(curvature):
     """Claim: a thread for each core, each in a batch of searches, and none waits for the other without end."""
     subprocess.run([sys.executable, "-c", AT_ONCE.replace("{curvature}", curvature)], check=True, timeout=300)

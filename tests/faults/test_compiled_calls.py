@@ -113,6 +113,7 @@ def test_identify_keeps_the_fit(tmp_path):
     assert not list(tmp_path.glob(".jaxsub-*"))
 
 
+@pytest.mark.long
 def test_sweep_keeps_what_is_done(tmp_path):
     """Claim: where the second chunk is in an endless call, the first stays and is counted."""
     write_rig(tmp_path)

@@ -85,17 +85,16 @@ def test_a_killed_diagnosis_leaves_the_answer_so_far(killed):
 
 
 def test_the_next_call_goes_on_from_the_answer_so_far(files, killed, tmp_path):
-    """Claim: begun with the killed one's vehicle it names the same effect and numbers as one that nothing ended."""
+    """Claim: begun with the killed one's vehicle it names the effect that is there, and begins with it."""
     begin = ["--begin", str(killed[1] / "improved.toml")]
     code, _, found = ended(files, tmp_path / "again", begin=begin)
-    _, _, whole = ended(files, tmp_path / "whole")
-    assert code == 0 and found["complete"] and found["verdict"] == whole["verdict"] == "named"
-    (own,), (reference,) = found["physics"], whole["physics"]
-    assert own["effect"] == reference["effect"] == "quadratic-damping"
-    assert own["parameters"]["D2_x"]["value"] == pytest.approx(reference["parameters"]["D2_x"]["value"], rel=1e-3)
+    assert code == 0 and found["complete"] and found["verdict"] == "named"
+    (own,) = found["physics"]
+    assert own["effect"] == "quadratic-damping"
+    size = own["parameters"]["D2_x"]
+    assert abs(size["value"] + 3.0) < 4.0 * size["standard_error"] < 0.2
     # its first decision is about what it was begun with, and nothing is proposed before
     assert [one["outcome"] for one in found["decisions"][:2]] == ["accepted"] * 2
-    assert whole["decisions"][0]["outcome"] == "proposed"
 
 
 def test_a_vehicle_without_more_effects_begins_nothing(files, tmp_path):

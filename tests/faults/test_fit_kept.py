@@ -48,6 +48,7 @@ def test_fit_is_kept_when_what_follows_is_ended(tmp_path, number):
     assert abs(found["coefficients"]["K_x"]["value"] - 4.0) < 5.0 * found["coefficients"]["K_x"]["standard_error"]
 
 
+@pytest.mark.long
 def test_a_later_call_replaces_the_fit_that_was_kept(tmp_path):
     """Claim: what is left of a killed call is jaxsub's own: --overwrite takes it, and the scratch folder goes."""
     write_rig(tmp_path)

@@ -115,6 +115,7 @@ def test_an_actuator_without_a_rate_limit_does_as_it_is_told():
     np.testing.assert_allclose(bounds.follow(jnp.asarray(commands)), 0.5 * commands, atol=1e-9)
 
 
+@pytest.mark.long
 def test_design_for_a_gain_alone_is_the_dominant_singular_vector_of_its_response():
     vehicle = only_free(oscillator(coefficients=RESONANCE), "B_x_drive")
     dt, energy, n = 0.1, 0.5, len(TIMES)

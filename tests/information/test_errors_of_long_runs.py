@@ -44,6 +44,7 @@ def test_white_residuals_of_a_long_run_leave_standard_errors_as_they_are():
     assert np.all(ratio < 1.3)
 
 
+@pytest.mark.long
 def test_small_disturbance_of_a_long_run_is_found():
     """Claim: a force that moves the rate by a tenth of its noise is found, and widens standard errors tenfold."""
     size, time = 1e-4, 3.0

@@ -64,7 +64,7 @@ def told(recording, sigma):
 
 
 @pytest.mark.parametrize("sigma", [0.01, "estimate"])
-@pytest.mark.parametrize("damage", [hole, dead, spikes])
+@pytest.mark.parametrize("damage", [hole, *(pytest.param(d, marks=pytest.mark.long) for d in (dead, spikes))])
 def test_no_coefficient_of_a_damaged_log_is_identified(damage, sigma):
     """Claim: whether σ is given or estimated, the fit does not explain the runs and nothing counts as identified."""
     found, assessment, said = told(damage(log()), sigma)

@@ -64,7 +64,7 @@ def body_std(x, joint):
     return jnp.linalg.norm(joint[:3], axis=1)
 
 
-@pytest.mark.parametrize("kind", [PaperAttitude, RotationAttitude])
+@pytest.mark.parametrize("kind", [pytest.param(PaperAttitude, marks=pytest.mark.long), RotationAttitude])
 def test_the_navigator_is_its_parts_one_after_the_other(kind):
     """Constructed over the recording, then filtered, then reckoned, each by itself."""
     system, readings = navigator(kind), flight()
@@ -123,6 +123,7 @@ def test_the_navigator_in_flight_and_off_line_says_the_same():
     same(program.unpack(packed), last, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.long
 def test_the_navigator_in_float32_stays_so():
     system, readings = navigator(dtype=jnp.float32), flight(dtype=jnp.float32)
     state, seen = follow(system, navigator_start(system, readings), readings)

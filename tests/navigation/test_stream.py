@@ -32,6 +32,7 @@ def test_in_flight_and_off_line_say_the_same():
     assert counted(state.faults) == {}
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_the_step_in_c_says_the_same():
     """Through a start, measurements and their absence, and a reading that is passed over."""

@@ -31,7 +31,9 @@ FIGURES = {
 }
 
 
-@pytest.mark.parametrize("verdict", FIGURES)
+@pytest.mark.parametrize(
+    "verdict", [pytest.param(v, marks=[pytest.mark.long] if v in ("none", "unknown") else []) for v in FIGURES]
+)
 def test_figures_are_png_files(report, verdict):
     files = list((report(verdict) / "figures").iterdir())
     assert {file.name for file in files} == {f"{name}.png" for name in FIGURES[verdict]}

@@ -23,6 +23,7 @@ def swept(folder, name):
     return open_sweep(folder / name), library
 
 
+@pytest.mark.long
 def test_a_garbled_library_is_made_anew(tmp_path):
     found, library = swept(tmp_path, "sound")
     sound = library.read_bytes()

@@ -56,7 +56,7 @@ def test_a_search_says_what_a_fit_says(done):
         assert abs(float(own.estimate) - value) < 0.01 * error
 
 
-@pytest.mark.parametrize("width", [96, 41])
+@pytest.mark.parametrize("width", [96, pytest.param(41, marks=pytest.mark.long)])
 def test_answers_agree_however_wide_the_chunks_are(done, tmp_path, width):
     assert farthest(done[1], sweep(plan(width=[width]), tmp_path / "out")) <= 1e-9
 

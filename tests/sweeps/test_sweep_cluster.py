@@ -52,6 +52,7 @@ class Killer(threading.Thread):
             self.kept.set()
 
 
+@pytest.mark.long
 def test_a_worker_killed_in_the_middle_costs_nothing(cluster, tmp_path):
     alone = sweep(plan(), tmp_path / "alone")
     killer = Killer(cluster)

@@ -120,6 +120,7 @@ def test_a_folder_that_is_no_sweep_is_refused_with_and_without_overwrite(tmp_pat
     assert tree(tmp_path) == before
 
 
+@pytest.mark.long
 def test_overwrite_keeps_the_old_sweep_until_the_new_one_is_done(tmp_path, monkeypatch, capsys):
     def stopped(*_):
         raise KeyboardInterrupt

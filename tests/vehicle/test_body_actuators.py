@@ -308,7 +308,7 @@ def rov_rates(x, commands):
     return np.concatenate([np.linalg.solve(M, force), attitude, [sinking], (commands - lagged) / LAG])
 
 
-@pytest.mark.parametrize("solver", ["reference", "sampled"])
+@pytest.mark.parametrize("solver", ["reference", pytest.param("sampled", marks=pytest.mark.long)])
 def test_rov_of_eight_thrusters_moves_by_fossen_s_equations(solver):
     """Claim: in two and a half seconds of random volts no state differs by 1e-6 from a SciPy integration."""
     vehicle, times = rov(), 0.01 * np.arange(251)

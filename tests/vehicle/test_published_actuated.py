@@ -118,7 +118,7 @@ RUNS = {
 }
 
 
-@pytest.mark.parametrize("solver", ["reference", "sampled"])
+@pytest.mark.parametrize("solver", ["reference", pytest.param("sampled", marks=pytest.mark.long)])
 @pytest.mark.parametrize("case", RUNS)
 def test_vehicle_moves_by_the_published_equations(case, solver):
     """Claim: four seconds of an ROV and a catamaran and a ship's zigzag of forty differ by less than 1e-6."""

@@ -49,7 +49,10 @@ SORTS = {
 }
 
 
-@pytest.mark.parametrize("place", SORTS)
+LONG = {"coefficients.Z_w|w|", "coefficients.Z_wdot", "coefficients.M_delta_e"}
+
+
+@pytest.mark.parametrize("place", [pytest.param(p, marks=[pytest.mark.long] if p in LONG else []) for p in SORTS])
 def test_a_run_moves_as_the_vehicle_with_its_number(place):
     """Claim: accelerations, outputs and their gradient are those of a vehicle without variation that has the number."""
     name = place.removeprefix("outputs.").removeprefix("body.").removeprefix("coefficients.")
