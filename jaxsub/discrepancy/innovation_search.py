@@ -121,6 +121,7 @@ class InnovationSearch:
                 return dataclasses.replace(trial, damping=damping)
         return iterate
 
+    @quietly
     def alternated(self, iterate: Iterate) -> Iterate:
         """One alternation: a new disturbance, then a scoring step under it; the same iterate where neither gains.
 
@@ -141,6 +142,7 @@ class InnovationSearch:
                 break
         return iterate
 
+    @quietly
     def maximised(self, iterate: Iterate) -> Iterate:
         """Alternations with as many scoring steps as gain under each disturbance, until the likelihood stays."""
         iterate = self._scored(iterate)

@@ -17,7 +17,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
-from ..arrays import Values, namespace
+from ..arrays import Values, namespace, quietly
 from ..likelihood import Averages, Columns, Disturbance, System, covariance_derivatives, restricted, total_products
 from ..programs import compiled
 from .damped import Damped
@@ -43,6 +43,7 @@ class _Given(NamedTuple):
     centre: Values
 
 
+@quietly
 def estimate_disturbance(
     system: System,
     columns: Columns,
