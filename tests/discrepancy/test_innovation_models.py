@@ -124,6 +124,7 @@ def test_a_view_that_lacks_an_effect_is_that_of_the_vehicle_without_it():
     assert abs(there - expected) < 0.05 * abs(expected - before)
 
 
+@pytest.mark.long
 def test_what_is_asked_for_in_the_place_of_an_effect_takes_no_other_pass_through_the_recordings():
     """Claim: candidates mapped from those of the whole model have the evidence that they have from the view without."""
     view = view_of_truth()

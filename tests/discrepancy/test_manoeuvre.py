@@ -90,6 +90,7 @@ def test_separation_is_that_of_central_differences_and_least_squares(body):
     assert np.all(np.isinf(np.diag(found)))
 
 
+@pytest.mark.long
 def test_gradient_of_the_search_is_that_of_central_differences():
     rivals = on(RIVALS, WEAK, np.zeros((SAMPLES, 1)), SIGMA)
     both = eqx.filter_jit(jax.value_and_grad(lambda free: loss(free, rivals)))

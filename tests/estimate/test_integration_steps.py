@@ -71,6 +71,7 @@ def bent():
     return tuple(synthetic(bending(), inputs, seed=2, states=integrate))
 
 
+@pytest.mark.long
 def test_steps_are_halved_until_noise_hides_the_difference():
     """Claim: of a hysteresis one step a sample is off by several times the noise and those taken by less than a
     fortieth; without a state, or with a thousand times the noise, they are as they were; one that diverges is cured."""

@@ -84,6 +84,7 @@ def test_a_killed_diagnosis_leaves_the_answer_so_far(killed):
     assert [effect.label for effect in improved.effects] == ["quadratic-damping[x]"]
 
 
+@pytest.mark.long
 def test_the_next_call_goes_on_from_the_answer_so_far(files, killed, tmp_path):
     """Claim: begun with the killed one's vehicle it names the effect that is there, and begins with it."""
     begin = ["--begin", str(killed[1] / "improved.toml")]

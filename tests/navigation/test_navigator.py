@@ -191,7 +191,7 @@ def faults_by_hand(readings, patience=10):
     return ({name: count for name, count in part.items() if count} for part in (attitude, position))
 
 
-@pytest.mark.parametrize("kind", [PaperAttitude, RotationAttitude])
+@pytest.mark.parametrize("kind", [pytest.param(PaperAttitude, marks=pytest.mark.long), RotationAttitude])
 def test_nothing_makes_the_navigator_other_than_finite_and_every_fault_is_counted(kind):
     """Quaternions of no length, tumbling, time back, twice and gone, minutes without a fix, stops, no numbers."""
     flights = [spoilt(seed) for seed in range(40)]

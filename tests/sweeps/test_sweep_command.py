@@ -208,6 +208,7 @@ def test_a_model_that_does_not_explain_its_runs_is_no_success(tmp_path, monkeypa
     assert sum(basin["count"] for basin in told["basins"]) + told["without_an_end"] == told["basins_of"] == 3
 
 
+@pytest.mark.long
 def test_axes_of_the_command_line(tmp_path, monkeypatch, capsys):
     arguments = files(tmp_path)
     (tmp_path / "other.toml").write_bytes((tmp_path / "vehicle.toml").read_bytes())

@@ -49,7 +49,7 @@ SORTS = {
 }
 
 
-LONG = {"coefficients.Z_w|w|", "coefficients.Z_wdot", "coefficients.M_delta_e"}
+LONG = {"body.mass", "coefficients.Z_w|w|", "coefficients.Z_wdot", "coefficients.M_delta_e"}
 
 
 @pytest.mark.parametrize("place", [pytest.param(p, marks=[pytest.mark.long] if p in LONG else []) for p in SORTS])
