@@ -7,6 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -110,10 +111,10 @@ def _resumed(
     return watch, _Progress(reader, more["lines"], more["written"], [])
 
 
-def _events_file(out: Path | None, written: int, stored: bool) -> BinaryIO:
-    """The file of events, without what a process that was killed wrote after its last state."""
+def _events_file(out: Path | None, written: int, stored: bool) -> AbstractContextManager[BinaryIO | None]:
+    """The file of events, without what a process that was killed wrote after its last state; None where none is."""
     if out is None:
-        return open(os.devnull, "ab")
+        return nullcontext()
     if out.exists() and not stored:
         raise InputError(str(out), "already exists", "choose another --out, or give its --state to go on")
     try:
@@ -124,7 +125,7 @@ def _events_file(out: Path | None, written: int, stored: bool) -> BinaryIO:
     return file
 
 
-def _go_on(watch: Watcher, done: _Progress, lines: Iterator[str], out: BinaryIO, asked: Asked) -> None:
+def _go_on(watch: Watcher, done: _Progress, lines: Iterator[str], out: BinaryIO | None, asked: Asked) -> None:
     emit = lambda events: _emit(events, out, done)
     saved = time.monotonic()
     reported = watch.time if np.isfinite(watch.time) else done.waiting[0][0]
@@ -164,10 +165,12 @@ def _status(watch: Watcher, done: _Progress) -> dict[str, Any]:
     return watch.status() | {"malformed": done.reader.malformed}
 
 
-def _emit(events: Sequence[dict[str, Any]], out: BinaryIO, done: _Progress) -> None:
+def _emit(events: Sequence[dict[str, Any]], out: BinaryIO | None, done: _Progress) -> None:
     text = "".join(json.dumps(plain(event), allow_nan=False) + "\n" for event in events)
     sys.stdout.write(text)
     sys.stdout.flush()
+    if out is None:
+        return
     done.written += out.write(text.encode())
     out.flush()
     os.fsync(out.fileno())
