@@ -154,8 +154,6 @@ def _rows(lines: Iterator[str], done: _Progress) -> Iterator[np.ndarray]:
     done.waiting = []
     for line in lines:
         done.lines += 1
-        if line.rstrip("\r") == done.reader.header:
-            continue
         row = done.reader.row(line)
         if row is not None:
             yield row
@@ -188,3 +186,4 @@ def _save(watch: Watcher, done: _Progress, path: Path) -> None:
         )
     except OSError as error:
         raise OutputError(str(path), f"cannot be written ({error.strerror})", "choose another --state") from error
+    options().kept = f"{path} holds the state to go on from"

@@ -103,6 +103,7 @@ def test_lines_are_read_in_their_units_and_malformed_ones_counted(vehicle):
     np.testing.assert_allclose(row, [0.3, 1.5, 0.02, np.nan])
     assert [lines.row(line) for line in ("1.5,20", "a,b,c,d,e", "", "1,2,,3,4")] == [None] * 4
     assert lines.malformed == 4
+    assert lines.row(lines.header) is None and lines.malformed == 4
     with pytest.raises(InputError, match="has no column 'x_rate'; did you mean x_rat"):
         Lines("t,f,x,x_rat", vehicle.layout, "stream")
 
