@@ -34,7 +34,7 @@ class Lines:
         self._scale, self._offset = np.array([_line(source, name, units[name]) for name in wanted]).T
 
     def row(self, line: str) -> Float[np.ndarray, " w"] | None:
-        """Time, signals and outputs (1 + m + c,) of a `line`, SI, NaN where missing; None of a bad one and the header."""
+        """Time, signals and outputs (1 + m + c,) of a `line`, SI, NaN where missing; None of a bad one or a header."""
         if line.strip("\ufeff\r\n") == self.header:
             return None
         try:
