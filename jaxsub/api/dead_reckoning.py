@@ -14,6 +14,7 @@ from ..recording.recording import Recordings
 from ..vehicle import AbstractVehicle
 from .recordings import checked
 from .result import AbstractResult
+from .states import innovation_table
 from .table import Parts, Table
 
 if TYPE_CHECKING:
@@ -115,10 +116,9 @@ class DeadReckoning(AbstractResult):
         names = self.vehicle.layout.states
         rows = []
         for run, track in zip(self.recordings, self.tracks, strict=True):
-            filtered, smoothed = np.median(track.filtered_std, axis=0), np.median(track.smoothed_std, axis=0)
             rows += [
                 (run.name, name, f"{a:.3g}", f"{b:.3g}", self.vehicle.layout.unit(name))
-                for name, a, b in zip(names, filtered, smoothed, strict=True)
+                for name, a, b in zip(names, *_usual(track), strict=True)
             ]
         title = f"States of {self.vehicle.layout.name}"
         parts = [title, Table(("run", "state", "σ filtered, median", "σ smoothed", "unit"), rows)]
@@ -126,12 +126,8 @@ class DeadReckoning(AbstractResult):
 
     def parts(self) -> Parts:
         """The same, and by run and channel the rms of innovations in their standard deviations."""
-        rows = []
-        for run, track in zip(self.recordings, self.tracks, strict=True):
-            for channel, values in zip(self.vehicle.layout.channels, track.innovations.T, strict=True):
-                seen = values[np.isfinite(values)]
-                rows.append((run.name, channel, str(seen.size), _rms(seen)))
-        return [*self.brief(), Table(("run", "channel", "samples", "rms innovation/its σ"), rows)]
+        innovations = (track.innovations for track in self.tracks)
+        return [*self.brief(), innovation_table(self.vehicle, self.recordings, innovations)]
 
     def _drift_table(self) -> Table:
         shown = lambda drift: ["position"] if "position" in drift.error else self._hidden(drift.outage)
@@ -156,9 +152,7 @@ class DeadReckoning(AbstractResult):
                 "samples": len(run.times),
                 "sigma": {
                     name: {"filtered": float(a), "smoothed": float(b), "unit": self.vehicle.layout.unit(name)}
-                    for name, a, b in zip(
-                        names, np.median(track.filtered_std, axis=0), np.median(track.smoothed_std, axis=0), strict=True
-                    )
+                    for name, a, b in zip(names, *_usual(track), strict=True)
                 },
             }
             for run, track in zip(self.recordings, self.tracks, strict=True)
@@ -201,5 +195,6 @@ class DeadReckoning(AbstractResult):
             save(self.recording(index, smoothed=False), folder / f"{name}_filtered.parquet")
 
 
-def _rms(values: np.ndarray) -> str:
-    return f"{np.sqrt(np.mean(values**2)):.3g}" if values.size else "none"
+def _usual(track: Track) -> tuple[np.ndarray, np.ndarray]:
+    """(s,) medians of the states' standard deviations, filtered and smoothed."""
+    return np.median(track.filtered_std, axis=0), np.median(track.smoothed_std, axis=0)

@@ -1,6 +1,7 @@
 """States of a vehicle along recordings, by an extended Kalman filter of its model."""
 
 import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
@@ -9,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from ..estimate import batch, initial_guess, search
+from ..estimate import batch, channel_noise, initial_guess
 from ..filter import AbstractFilter, Estimate, ExtendedKalmanFilter, VehicleProcess, over_runs, samples, vehicle_filter
 from ..programs import compiled
 from ..recording import Recording, save, to_pandas, to_xarray
@@ -42,15 +43,27 @@ def estimate_states(
     **Raises** `InputError` for recordings that cannot be used, and for effects whose memory no filter holds.
     """
     runs = checked(vehicle, recordings).recordings
-    known = vehicle.holding([row.name for row in vehicle.layout.free])
+    known = vehicle.holding(vehicle.values())
     stacked = batch(known, runs).padded()
-    given = [output.sigma for output in known.layout.outputs]
-    sigma = search(known, stacked, moving=False).sigma if None in given else jnp.asarray(given, float)
+    sigma = channel_noise(known, stacked)
     process = VehicleProcess.of(known, stacked.substeps)
     starts = jnp.asarray(initial_guess(known, stacked)[0])
     found = jax.tree.map(np.asarray, _filtered(vehicle_filter(process, sigma, kind), stacked, starts))
     cut = lambda index, run: jax.tree.map(lambda leaf: leaf[index, : len(run.times)], found)
     return States(vehicle, tuple(runs), tuple(cut(index, run) for index, run in enumerate(runs)))
+
+
+def innovation_table(
+    vehicle: AbstractVehicle, recordings: Iterable[Recording], whitened: Iterable[np.ndarray]
+) -> Table:
+    """By run and channel the rms of innovations, `whitened` (K, c) of each run in their standard deviations."""
+    rows = []
+    for run, own in zip(recordings, whitened, strict=True):
+        for channel, values in zip(vehicle.layout.channels, own.T, strict=True):
+            seen = values[np.isfinite(values)]
+            rms = f"{np.sqrt(np.mean(seen**2)):.3g}" if seen.size else "none"
+            rows.append((run.name, channel, str(seen.size), rms))
+    return Table(("run", "channel", "samples", "rms innovation/its σ"), rows)
 
 
 @compiled
@@ -81,16 +94,14 @@ class States(AbstractResult):
 
     def brief(self) -> Parts:
         """rms of the innovations in their standard deviations, by run and channel: 1 for a consistent filter."""
-        rows = []
-        for index, run in enumerate(self.recordings):
-            for channel, values in zip(self.vehicle.layout.channels, self.whitened(index).T, strict=True):
-                seen = values[np.isfinite(values)]
-                rms = f"{np.sqrt(np.mean(seen**2)):.3g}" if seen.size else "none"
-                rows.append((run.name, channel, str(seen.size), rms))
         diverged = [run.name for run, e in zip(self.recordings, self.estimates, strict=True) if np.any(e.diverged)]
         title = f"States of {self.vehicle.layout.name}: {', '.join(self.vehicle.layout.states)}."
         warning = [f"The filter diverged in {', '.join(diverged)}."] if diverged else []
-        return [title, *warning, Table(("run", "channel", "samples", "rms innovation/its σ"), rows)]
+        return [
+            title,
+            *warning,
+            innovation_table(self.vehicle, self.recordings, map(self.whitened, range(len(self.recordings)))),
+        ]
 
     def parts(self) -> Parts:
         """The same."""

@@ -53,7 +53,7 @@ def run(vehicle_path: Path, source: str, asked: Asked) -> None:
     lines = lines_of(source)
     stored = asked.state is not None and asked.state.exists()
     begin = _resumed if stored else _begun
-    watch, done = begin(vehicle, vehicle_path, lines, source, asked)
+    watch, done = begin(vehicle, lines, source, asked)
     with _events_file(asked.out, done.written, stored) as out:
         _go_on(watch, done, lines, out, asked)
 
@@ -68,19 +68,10 @@ class _Progress:
     waiting: list[np.ndarray]
 
 
-def _begun(
-    vehicle: AbstractVehicle, path: Path, lines: Iterator[str], source: str, asked: Asked
-) -> tuple[Watcher, _Progress]:
+def _begun(vehicle: AbstractVehicle, lines: Iterator[str], source: str, asked: Asked) -> tuple[Watcher, _Progress]:
     header = next(lines, "") if asked.header is None else asked.header
-    reader = Lines(header, vehicle.layout, source)
-    taken, first = int(asked.header is None), []
-    for line in lines:
-        taken += 1
-        row = reader.row(line)
-        if row is not None:
-            first.append(row)
-        if len(first) == _FIRST:
-            break
+    done = _Progress(Lines(header, vehicle.layout, source), int(asked.header is None), 0, [])
+    done.waiting = first = list(itertools.islice(_rows(lines, done), _FIRST))
     if len(first) < 2:
         raise InputError(source, f"has {len(first)} samples", "give at least two")
     clean = load_runs(asked.clean, vehicle) if asked.clean else []
@@ -94,12 +85,10 @@ def _begun(
             interval=asked.interval,
         )
     terminal.note(f"threshold {watch.threshold:.1f} for {asked.false_alarms_per_hour:g} false alarms per hour")
-    return watch, _Progress(reader, taken, 0, first)
+    return watch, done
 
 
-def _resumed(
-    vehicle: AbstractVehicle, path: Path, lines: Iterator[str], source: str, asked: Asked
-) -> tuple[Watcher, _Progress]:
+def _resumed(vehicle: AbstractVehicle, lines: Iterator[str], source: str, asked: Asked) -> tuple[Watcher, _Progress]:
     assert asked.state is not None
     watch, more = Watcher.restored(asked.state, vehicle)
     reader = Lines(more["header"], vehicle.layout, source)
@@ -151,7 +140,6 @@ def _go_on(watch: Watcher, done: _Progress, lines: Iterator[str], out: BinaryIO 
 
 
 def _rows(lines: Iterator[str], done: _Progress) -> Iterator[np.ndarray]:
-    done.waiting = []
     for line in lines:
         done.lines += 1
         row = done.reader.row(line)

@@ -7,7 +7,7 @@ from .combined import Chain, Global
 from .dead_reckoning import Outage, Track, kinematic_filter, model_filter, tracks_of
 from .disturbance import estimate_disturbance
 from .filtered import Filtered
-from .fitting import AbstractSearchEnd, SearchEnd, Solution, channel_rms, evaluate, fit, race, search
+from .fitting import AbstractSearchEnd, SearchEnd, Solution, channel_noise, channel_rms, evaluate, fit, race, search
 from .initial_states import initial_guess, rest, state_channels
 from .integration_steps import substeps_for, substeps_unseen
 from .method import AbstractMethod, Found, Iterative, Passes, by_cost
@@ -46,6 +46,7 @@ __all__ = [
     "basins",
     "batch",
     "by_cost",
+    "channel_noise",
     "channel_rms",
     "disturbance_along",
     "ekf",

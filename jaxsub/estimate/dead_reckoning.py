@@ -32,7 +32,7 @@ from ..recording import Recording
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .batches import batch
-from .fitting import search
+from .fitting import channel_noise
 from .initial_states import initial_guess
 from .path_disturbance import disturbance_along
 
@@ -80,18 +80,16 @@ class Track(NamedTuple):
     innovation_std: np.ndarray
 
 
-def _known(vehicle: AbstractVehicle, runs: Sequence[Recording]) -> tuple[AbstractVehicle, Runs, Array]:
-    """The vehicle without free numbers, the runs stacked, and the noise of its channels."""
-    known = vehicle.holding([row.name for row in vehicle.layout.free])
-    stacked = batch(known, runs).padded()
-    given = [output.sigma for output in known.layout.outputs]
-    sigma = search(known, stacked, moving=False).sigma if None in given else jnp.asarray(given, float)
-    return known, stacked, sigma
+def _known(vehicle: AbstractVehicle, runs: Sequence[Recording]) -> tuple[AbstractVehicle, Runs]:
+    """The vehicle without free numbers, and the runs stacked."""
+    known = vehicle.holding(vehicle.values())
+    return known, batch(known, runs).padded()
 
 
 def model_filter(vehicle: AbstractVehicle, runs: Sequence[Recording]) -> AbstractFilter:
     """The filter of `vehicle` under the Gauss–Markov forces that make `runs` most probable."""
-    known, stacked, sigma = _known(vehicle, runs)
+    known, stacked = _known(vehicle, runs)
+    sigma = channel_noise(known, stacked)
     start, start_std = initial_guess(known, stacked)
     found = disturbance_along(known, stacked, sigma, start, start_std)
     process = DisturbedProcess(
@@ -102,7 +100,8 @@ def model_filter(vehicle: AbstractVehicle, runs: Sequence[Recording]) -> Abstrac
 
 def kinematic_filter(vehicle: AbstractVehicle, runs: Sequence[Recording]) -> AbstractFilter:
     """The filter of the kinematics of `vehicle`, whose velocities stray as fast as those measured in `runs` change."""
-    known, stacked, sigma = _known(vehicle, runs)
+    known, stacked = _known(vehicle, runs)
+    sigma = channel_noise(known, stacked)
     scale = np.asarray(state_scale(known, np.asarray(sigma)))
     density, layout = DENSITY * scale, known.layout
     for i, state in enumerate(layout.states[: len(layout.equations)]):
@@ -133,7 +132,7 @@ def tracks_of(
 
     **Raises** `InputError` where the filter diverges.
     """
-    known, stacked, _ = _known(vehicle, runs)
+    known, stacked = _known(vehicle, runs)
     length, layout = stacked.times.shape[1], known.layout
     mask = np.asarray(stacked.mask)
     masks = [mask]

@@ -166,6 +166,12 @@ def channel_rms(residual: Values, runs: Runs, channels: tuple[str, ...]) -> dict
     return dict(zip(channels, np.sqrt(mean_square).tolist(), strict=True))
 
 
+def channel_noise(vehicle: AbstractVehicle, runs: Runs) -> Float[Array, " c"]:
+    """(c,) noise of the channels of `vehicle`, SI: its file's; where that is open, as its fit to `runs` leaves it."""
+    given = [output.sigma for output in vehicle.layout.outputs]
+    return search(vehicle, runs, moving=False).sigma if None in given else jnp.asarray(given, float)
+
+
 def search(
     vehicle: AbstractVehicle,
     runs: Runs,

@@ -1,6 +1,6 @@
 """A vehicle watched on line: changes of its innovations, with a stated rate of false alarms."""
 
-from .calibration import Calibration, Tail, calibrated, calibrated_white
+from .calibration import Calibration, Tail, calibrated
 from .lines import Lines
 from .monitor import AlarmTest, Monitor, MonitorState, Observation
 from .setup import WatchedModel, initial_state, model_by_noise, model_of, monitor_of, rows_of
@@ -20,7 +20,6 @@ __all__ = [
     "WatchedModel",
     "Watcher",
     "calibrated",
-    "calibrated_white",
     "initial_state",
     "is_file",
     "lines_of",

@@ -19,19 +19,17 @@ class Autoregression(eqx.Module):
     **Fields**
 
     - `coefficients`: (p, c). `drawn`: (N, c) what they leave, from which u is drawn; none where u is Gaussian.
-    - `order`: the highest that any channel needs.
 
     Source: Bühlmann (1997), Bernoulli 3; Silverman and Young (1987), Biometrika 74, for smoothed draws.
     """
 
     coefficients: Float[Array, "p c"]
     drawn: Float[Array, "n c"] | None
-    order: int = eqx.field(static=True)
 
     @classmethod
     def white(cls, channels: int) -> "Autoregression":
         """Gaussian vectors of unit variance, independent over time."""
-        return cls(jnp.zeros((1, channels)), None, 0)
+        return cls(jnp.zeros((1, channels)), None)
 
     @classmethod
     def of(cls, series: Float[np.ndarray, "k c"]) -> "Autoregression":
@@ -41,7 +39,7 @@ class Autoregression(eqx.Module):
         coefficients = np.stack([np.pad(own, (0, order - len(own))) for own in found], axis=1)
         past = np.stack([series[order - lag : len(series) - lag] for lag in range(1, order + 1)])
         left = series[order:] - np.sum(coefficients[:, None] * past, axis=0)
-        return cls(jnp.asarray(coefficients), jnp.asarray(left), max(len(own) for own in found))
+        return cls(jnp.asarray(coefficients), jnp.asarray(left))
 
     def start(self, series: int) -> Float[Array, "p b c"]:
         """The past of so many series, before the first sample."""

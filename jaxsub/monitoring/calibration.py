@@ -49,7 +49,6 @@ class Tail(NamedTuple):
     level: float
     rate: float
     scale: float
-    hours: float
 
     def threshold(self, rate: float) -> float:
         """The threshold with a `rate` of false alarms per hour."""
@@ -65,12 +64,11 @@ class Calibration(NamedTuple):
 
     **Fields**
 
-    - `monitor`: whose test has the threshold. `tail`: of false alarms. `order`: of the autoregressions.
+    - `monitor`: whose test has the threshold. `tail`: of false alarms.
     """
 
     monitor: Monitor
     tail: Tail
-    order: int
 
 
 def calibrated(
@@ -79,13 +77,14 @@ def calibrated(
     rows: Float[np.ndarray, "k w"],
     rate: float,
     *,
+    white: bool = False,
     hours: float = HOURS,
     seed: int = 0,
 ) -> Calibration:
     """`monitor` with the threshold that gives `rate` false alarms per hour, by the clean `rows` (K, w).
 
     `state` is that before the first of them. So many `hours` are resampled, by the random `seed`, or fewer of a stream
-    that is fast.
+    that is fast. Where innovations are `white`, as the monitor assumes, the rows say only how the vehicle moves.
 
     **Raises** `InputError` for rows whose innovations are too few or not finite.
     """
@@ -94,27 +93,9 @@ def calibrated(
     if taken.sum() < _FEWEST:
         raise InputError("clean runs", f"have {taken.sum()} usable samples", f"give at least {_FEWEST}")
     interval = float(np.median(np.diff(rows[taken, 0])))
-    return _with_threshold(monitor, met, Autoregression.of(met.white[taken]), interval, rate, hours, seed, own)
-
-
-def calibrated_white(
-    monitor: Monitor,
-    state: MonitorState,
-    rows: Float[np.ndarray, "k w"],
-    rate: float,
-    *,
-    hours: float = HOURS,
-    seed: int = 0,
-) -> Calibration:
-    """`monitor` with the threshold that gives `rate` false alarms per hour where innovations are white, as it assumes.
-
-    The `rows` (K, w), which begin in `state`, say only how the vehicle moves. So many `hours` are drawn, by the random
-    `seed`.
-    """
-    met = jax.tree.map(np.asarray, _followed(monitor, state, jnp.asarray(rows))[0])
-    interval = float(np.median(np.diff(rows[:, 0])))
-    model, ones = Autoregression.white(monitor.sigma.size), np.ones_like(monitor.test.variance)
-    return _with_threshold(monitor, met, model, interval, rate, hours, seed, ones)
+    model = Autoregression.white(monitor.sigma.size) if white else Autoregression.of(met.white[taken])
+    own = np.ones_like(own) if white else own
+    return _with_threshold(monitor, met, model, interval, rate, hours, seed, own)
 
 
 def _with_threshold(
@@ -141,7 +122,7 @@ def _with_threshold(
     test = dataclasses.replace(
         monitor.test, threshold=jnp.asarray(tail.threshold(rate)), variance=jnp.asarray(variance)
     )
-    return Calibration(dataclasses.replace(monitor, test=test), tail, model.order)
+    return Calibration(dataclasses.replace(monitor, test=test), tail)
 
 
 def _significant(own: Float[np.ndarray, "m q"], samples: int) -> Float[np.ndarray, "m q"]:
@@ -157,16 +138,13 @@ def _followed(
     """The rows as the monitor's filter meets them, and the mean of z² of each change in each window."""
     one = jnp.ones_like(monitor.test.variance)
 
-    def step(state: MonitorState, row: Array) -> tuple[MonitorState, tuple[FilteredRow, Array]]:
-        after, met, _ = monitor.examined(state, row)
-        return after, (met, squares(after.score, after.signatures.information, one))
-
-    def counted(carry: tuple[MonitorState, Array], row: Array) -> tuple[tuple[MonitorState, Array], FilteredRow]:
+    def step(carry: tuple[MonitorState, Array], row: Array) -> tuple[tuple[MonitorState, Array], FilteredRow]:
         state, total = carry
-        after, (met, z2) = step(state, row)
+        after, met, _ = monitor.examined(state, row)
+        z2 = squares(after.score, after.signatures.information, one)
         return (after, total + jnp.where(met.taken, z2, 0.0)), met
 
-    (_, total), met = jax.lax.scan(counted, (state, jnp.zeros_like(one)), rows)
+    (_, total), met = jax.lax.scan(step, (state, jnp.zeros_like(one)), rows)
     return met, total / jnp.maximum(jnp.sum(met.taken), 1)
 
 
@@ -227,11 +205,10 @@ def tail_of(series: Float[np.ndarray, "b parts"], duration: float, rate: float) 
     hours = series.size * duration / 3600.0
     # at a low level alarms run into each other, and the peak of many is no peak of one
     wanted = min(max(min(_PEAKS, series.size / (_APART * _PARTS)), 2.0 * rate * hours), 0.2 * series.size)
-    low, high = 0.0, float(series.max())
     # counts fall with the level once that is above the bulk
-    low = float(np.median(series))
+    low, high = float(np.median(series)), float(series.max())
     for _ in range(40):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if len(peaks(series, middle, _PARTS)) > wanted else (low, middle)
     found = peaks(series, low, _PARTS)
-    return Tail(low, len(found) / hours, float(np.mean(found - low)), hours)
+    return Tail(low, len(found) / hours, float(np.mean(found - low)))

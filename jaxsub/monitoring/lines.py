@@ -25,7 +25,7 @@ class Lines:
         self._columns = [Column(cell.strip()) for cell in _cells(self.header)]
         units = dict(split_header(column.header) for column in self._columns)
         at = {split_header(column.header)[0]: i for i, column in enumerate(self._columns)}
-        wanted = (TIME, *layout.held, *layout.interpolated, *layout.columns)
+        wanted = (TIME, *row_columns(layout))
         for name in wanted:
             if name not in at:
                 remedy = suggestion(name, at, f"its columns are {', '.join(at) or 'none'}")
@@ -50,6 +50,11 @@ class Lines:
             return None
         known = np.array([np.nan if value is None else value for value in values])
         return self._offset + self._scale * known
+
+
+def row_columns(layout: Layout) -> tuple[str, ...]:
+    """The columns of a row after its time: signals that are held, those interpolated, and outputs."""
+    return (*layout.held, *layout.interpolated, *layout.columns)
 
 
 def _cells(line: str) -> list[str]:

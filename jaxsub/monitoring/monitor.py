@@ -56,7 +56,6 @@ class Observation(eqx.Module):
     - `statistic`: the largest z² of any change in any window, over its variance; `change`: which of the n + c; `age`:
       samples since the window began; `size`: the change's estimated size, N, N m or the channel's sigma; `size_std`:
       its standard deviation.
-    - `by_change`: (n + c,) the largest z² of each change.
     - `raised`, `ended`: whether an alarm begins or ends. `recovered`: (c,) channels that are believed again although
       they jumped.
     - `estimate`: of the filter.
@@ -68,7 +67,6 @@ class Observation(eqx.Module):
     age: Int[Array, ""]
     size: Float[Array, ""]
     size_std: Float[Array, ""]
-    by_change: Float[Array, " q"]
     raised: Bool[Array, ""]
     ended: Bool[Array, ""]
     recovered: Bool[Array, " c"]
@@ -215,7 +213,6 @@ class Monitor(AbstractStream):
             jnp.minimum(state.signatures.age[window], jnp.asarray(window_lengths(len(z2)))[window]),
             state.score[window, change] / known,
             1.0 / jnp.sqrt(known),
-            jnp.max(z2, axis=0),
             above & ~state.alarm,
             ended,
             recovered,

@@ -24,6 +24,7 @@ from ..estimate import side_by_side
 from ..likelihood import Columns, Disturbance, filter_runs, padded_width, total_products
 from ..recording import Recording
 from ..simulation import Trajectory
+from .lines import row_columns
 from .setup import WatchedModel
 
 # rows that are kept, and samples since a change at which it is named, and named again
@@ -87,7 +88,7 @@ def _shown(effect: AbstractEffect, probability: float, sizes: np.ndarray) -> dic
 def _view(model: WatchedModel, rows: Float[np.ndarray, "k w"], x: Float[np.ndarray, " s"]) -> View:
     """The vehicle's view of `rows` (K, w) from the state `x` (s,) at the first of them."""
     layout, disturbance = model.vehicle.layout, _forces(model)
-    names = (*layout.held, *layout.interpolated, *layout.columns)
+    names = row_columns(layout)
     signals = len(layout.held) + len(layout.interpolated)
     table = np.where(np.isinf(rows), np.nan, rows)
     # an input that is missing is the last one

@@ -17,6 +17,7 @@ from ..navigation import Stream
 from ..recording import Recording
 from ..simulation import sampled_states, synthetic
 from ..vehicle import AbstractVehicle
+from .lines import row_columns
 from .monitor import AlarmTest, Monitor
 from .signatures import windows_for
 
@@ -112,7 +113,7 @@ def rows_of(vehicle: AbstractVehicle, recordings: Sequence[Recording], gap: floa
     """Times, signals and outputs (1 + m + c) of `vehicle`, SI, of all `recordings`, each `gap` s after the last."""
     layout, found, end = vehicle.layout, [], 0.0
     for recording in recordings:
-        columns = [recording.column(name) for name in (*layout.held, *layout.interpolated, *layout.columns)]
+        columns = [recording.column(name) for name in row_columns(layout)]
         found.append(np.column_stack([recording.times - recording.times[0] + end, *columns]))
         end = found[-1][-1, 0] + gap
     return np.concatenate(found)
@@ -121,7 +122,7 @@ def rows_of(vehicle: AbstractVehicle, recordings: Sequence[Recording], gap: floa
 def initial_state(model: WatchedModel, rows: Float[np.ndarray, "k w"]) -> Float[Array, " s"]:
     """The state (s,) of the vehicle of `model`, SI, that the first of `rows` (K, w) show, else at rest."""
     layout = model.vehicle.layout
-    names = (*layout.held, *layout.interpolated, *layout.columns)
+    names = row_columns(layout)
     rows = rows[np.isfinite(rows[:, 0])]
     # two samples at least make a recording
     times = rows[0, 0] + model.interval * np.arange(max(2, len(rows)))
@@ -139,5 +140,4 @@ def _known(vehicle: AbstractVehicle) -> tuple[AbstractVehicle, Float[np.ndarray,
         if output.sigma is None:
             where = f"{vehicle.layout.name}, output {output.name}"
             raise InputError(where, "its sigma is to be estimated", "give sigma; jaxsub identify estimates it")
-    known = vehicle.holding([row.name for row in vehicle.layout.free])
-    return known, np.array([output.sigma for output in vehicle.layout.outputs], float)
+    return vehicle.holding(vehicle.values()), np.array([output.sigma for output in vehicle.layout.outputs], float)

@@ -45,10 +45,7 @@ def write_stored(path: Path, stored: Stored) -> None:
     known |= {name: np.asarray(values) for name, values in vars(d).items()}
     arrays = {f"array{i}": one for i, one in enumerate(stored.arrays)}
     with written_whole(path) as beside:
-        # NumPy adds .npz to a name without it
-        with_suffix = beside.with_suffix(".npz")
-        write_archive(with_suffix, _KEY, text, known | arrays)
-        with_suffix.rename(beside)
+        write_archive(beside, _KEY, text, known | arrays)
 
 
 def read_stored(path: Path, vehicle: AbstractVehicle) -> Stored:
@@ -56,7 +53,7 @@ def read_stored(path: Path, vehicle: AbstractVehicle) -> Stored:
 
     **Raises** `InputError` for a file that is no such state, is damaged or is of another vehicle.
     """
-    known = vehicle.holding([row.name for row in vehicle.layout.free])
+    known = vehicle.holding(vehicle.values())
     with opened_archive(path, _KEY, "is no state of jaxsub watch, or damaged", _REMEDY) as (content, arrays):
         if content["schema"] != _SCHEMA:
             raise InputError(str(path), f"has schema {content['schema']}, not {_SCHEMA}", _REMEDY)

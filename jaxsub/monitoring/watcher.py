@@ -13,7 +13,7 @@ from jaxtyping import Float
 from ..navigation import ahead_of_time
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
-from .calibration import HOURS, Tail, calibrated, calibrated_white
+from .calibration import HOURS, Tail, calibrated
 from .monitor import Monitor, MonitorState, Observation
 from .naming import NAMED_AT, Recent, named_effects
 from .setup import LONGEST, WatchedModel, initial_state, model_by_noise, model_of, monitor_of, rows_of
@@ -94,9 +94,8 @@ class Watcher:
         model = model._replace(longest=longest)
         monitor = monitor_of(model)
         rows = rows_of(model.vehicle, runs, gap=2.0 * monitor.stream.longest)
-        calibrate = calibrated if clean else calibrated_white
         begun = monitor.start(initial_state(model, rows[:1]))
-        found = calibrate(monitor, begun, rows, false_alarms_per_hour, hours=hours, seed=seed)
+        found = calibrated(monitor, begun, rows, false_alarms_per_hour, white=not clean, hours=hours, seed=seed)
         state = found.monitor.start(initial_state(model, first))
         return cls(model, found.monitor, found.tail, false_alarms_per_hour, state)
 

@@ -18,7 +18,10 @@ _DAMAGED = (ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, 
 
 def write_archive(path: Path, key: str, text: str, arrays: Mapping[str, np.ndarray]) -> None:
     """Write the JSON `text` under the name `key`, and `arrays` under theirs, to `path`."""
-    np.savez_compressed(path, **{key: np.frombuffer(text.encode(), np.uint8)}, **arrays)  # pyright: ignore[reportArgumentType]
+    content = {key: np.frombuffer(text.encode(), np.uint8), **arrays}
+    # to a path NumPy would add a suffix
+    with path.open("wb") as file:
+        np.savez_compressed(file, **content)  # pyright: ignore[reportArgumentType]
 
 
 @contextmanager
