@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.signal import lfilter
 
-from jaxsub.effects import AbstractEffect
+from jaxsub.effects import AbstractEffect, CrossflowDrag, HullAsymmetry, QuadraticDamping, SensorScale
 from jaxsub.recording import Recording
 from jaxsub.simulation.manoeuvres import prbs
 from jaxsub.simulation.sampled import Sampled
@@ -15,6 +15,8 @@ from jaxsub.vehicle import SubmergedBody
 from jaxsub.vehicle.catalogue import dsrv
 
 SAMPLES, INTERVAL = 300, 0.25
+# a vocabulary whose programs are compiled in seconds, and by whichever test comes first for all of them
+SMALL = (CrossflowDrag, HullAsymmetry, QuadraticDamping, SensorScale)
 
 
 @cache

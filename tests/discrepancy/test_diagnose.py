@@ -9,7 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from diagnosis_cases import INTERVAL, SAMPLES, disturbed, recorded, wrong
+from diagnosis_cases import INTERVAL, SAMPLES, SMALL, disturbed, recorded, wrong
 
 from jaxsub.discrepancy import diagnose
 from jaxsub.discrepancy.locate import traces
@@ -18,7 +18,6 @@ from jaxsub.discrepancy.view import look
 from jaxsub.effects import AbstractForce
 from jaxsub.effects.base import amplitude
 from jaxsub.effects.hull import CrossflowDrag, HullAsymmetry
-from jaxsub.effects.hull_damping import QuadraticDamping
 from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import fit
 from jaxsub.vehicle import vehicle_from, vehicle_text
@@ -46,9 +45,6 @@ class LayerForce(AbstractForce):
 
     def force(self, motion):
         return {"heave": self.size * jnp.sin(0.4 * motion.positions["z"])}
-
-
-SMALL = (CrossflowDrag, HullAsymmetry, QuadraticDamping, SensorScale)
 
 
 def run(effect, vocabulary=None):

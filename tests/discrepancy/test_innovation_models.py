@@ -157,6 +157,7 @@ def begun():
     return ModelFitter(lambda message: None, file), Model(fit, view, lost, ())
 
 
+@pytest.mark.long
 def test_what_is_not_asked_for_takes_nothing_else_along():
     """Claim: of two effects that are there and one that is not, only that one leaves the model."""
     fitter, base = begun()

@@ -83,10 +83,11 @@ def test_evidence_of_a_free_run_with_one_candidate_is_that_of_its_block():
     assert nothing == selector.free.log_evidence([])
 
 
-@pytest.mark.parametrize("runs", [recorded(None, 5)[:2], disturbed(3.0, (0.5, 1.5), 3)[:2]], ids=["clean", "disturbed"])
-def test_what_is_random_is_a_disturbance(runs):
+@pytest.mark.parametrize("disturbance", [None, (3.0, (0.5, 1.5), 3)], ids=["clean", "disturbed"])
+def test_what_is_random_is_a_disturbance(disturbance):
     """Claim: noise and random forces alone are neither structure nor a device that errs."""
-    said = leading(examine(look(baseline(runs)), KINDS, lambda message: None))
+    runs = disturbed(*disturbance) if disturbance else recorded(None, 5)
+    said = leading(examine(look(baseline(runs[:2])), KINDS, lambda message: None))
     assert next(iter(said)) == "disturbance" and said["disturbance"] > 0.5
 
 

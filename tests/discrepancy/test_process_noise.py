@@ -73,6 +73,7 @@ def test_it_rises_in_the_equation_and_at_the_time(equation):
     assert part[during].mean() > 3.0 * part[before].mean()
 
 
+@pytest.mark.long
 def test_locate_takes_it_as_evidence_and_a_note_says_it():
     runs = recorded("heave", 1)
     found = fitted(runs)

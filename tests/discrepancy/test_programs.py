@@ -19,7 +19,7 @@ sys.path[:0] = {[str(TESTS.parent), str(TESTS), str(TESTS / "discrepancy")]!r}
 import jax
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_disable_most_optimizations", True)
-from diagnosis_cases import recorded, wrong
+from diagnosis_cases import SMALL, recorded, wrong
 from jaxsub.discrepancy import diagnose
 from jaxsub.effects.sensors import SensorScale
 made, counts = [], []
@@ -29,16 +29,16 @@ jax.monitoring.register_event_duration_secs_listener(
 for seed, end in ((5, 75.0), (6, 72.5)):
     vehicle, runs = wrong(), [run.between(0.0, end) for run in recorded(SensorScale("q", 0.05), seed)]
     made.clear()
-    found, _ = diagnose(vehicle, runs[:2], runs[2:])
+    found, _ = diagnose(vehicle, runs[:2], runs[2:], vocabulary=SMALL if sys.argv[1] == "small" else None)
     counts.append((found.verdict, len(made)))
 print(json.dumps(counts))
 """
 
 
-@pytest.fixture(scope="module")
-def counted():
+@pytest.fixture(scope="module", params=["small", pytest.param("whole", marks=pytest.mark.long)])
+def counted(request):
     """Verdict and number of programs of two diagnoses, one after the other, in a process of their own."""
-    command = [sys.executable, "-c", PROGRAM]
+    command = [sys.executable, "-c", PROGRAM, request.param]
     done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=900)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])

@@ -103,7 +103,7 @@ CASES = {
     "turns": lambda: turning(problem(body(), lengths=(30, 20), amplitude=0.3)),
     "every effect": lambda: problem(laden(), lengths=(6, 5), amplitude=0.02),
 }
-LONG = ("turns", "every effect", "raw channels", "derivatives", "known start")
+LONG = ("turns", "every effect", "raw channels", "derivatives", "known start", "body")
 PARAMS = [pytest.param(case, marks=[pytest.mark.long] * (case in LONG)) for case in CASES]
 
 

@@ -105,7 +105,7 @@ def test_a_free_offset_of_an_input_is_found():
 
 
 @pytest.mark.parametrize("channel", ["z", "depth", "pressure"])
-@pytest.mark.parametrize("line", ["", "\nscale = 2.0\noffset = 30.0"])
+@pytest.mark.parametrize("line", [pytest.param("", marks=pytest.mark.long), "\nscale = 2.0\noffset = 30.0"])
 def test_the_first_samples_give_the_initial_state_in_any_form(channel, line):
     """Claim: depth and heading begin where raw columns say, by the sensors' numbers."""
     text = f"""

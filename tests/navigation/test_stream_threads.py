@@ -16,7 +16,7 @@ WAYS = {"xla": ahead_of_time, "c": lambda stream, *like: native(stream.step, *li
 THREADS, ROUNDS = 4, {"xla": 3, "c": 25}
 
 
-@pytest.mark.parametrize("way", ["xla", pytest.param("c", marks=C)])
+@pytest.mark.parametrize("way", ["xla", pytest.param("c", marks=[C, pytest.mark.long])])
 def test_estimates_of_threads_are_those_of_one(way):
     stream = attitude_stream()
     records = [jax.tree.map(np.asarray, gentle_readings(seed=seed)) for seed in range(THREADS)]

@@ -97,16 +97,16 @@ def test_a_write_that_was_cut_off_leaves_nothing_that_counts(two):
         ({"spread": 0.7}, "spread is 0.8 there"),
         ({"noise": (1,)}, "noise is"),
         ({"method": "newton"}, "method is gauss_newton there and newton here"),
-        ({"recordings": {"run": recordings(noise=False)}}, "recordings run .* other contents"),
-        ({"recordings": {"other": recordings()}}, "recordings other .* here alone"),
-        ({"vehicles": {"oscillator": vehicle().with_values({"K_x": jnp.asarray(4.5)})}}, "vehicles oscillator"),
+        (lambda: {"recordings": {"run": recordings(noise=False)}}, "recordings run .* other contents"),
+        (lambda: {"recordings": {"other": recordings()}}, "recordings other .* here alone"),
+        (lambda: {"vehicles": {"oscillator": vehicle().with_values({"K_x": jnp.asarray(4.5)})}}, "vehicles oscillator"),
     ],
 )
 def test_another_plan_is_refused_with_the_difference_and_the_folder_left_alone(tmp_path, changes, word):
     Store.of(tmp_path / "out", plan())
     before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()}
     with pytest.raises(InputError, match=word):
-        sweep(plan(**changes), tmp_path / "out")
+        sweep(plan(**(changes() if callable(changes) else changes)), tmp_path / "out")
     assert {path: path.read_bytes() for path in (tmp_path / "out").rglob("*") if path.is_file()} == before
 
 

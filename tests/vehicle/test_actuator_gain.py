@@ -218,6 +218,7 @@ def test_weak_drive_is_named_as_such():
     assert found.where[0].where == "input:drive"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_drive_as_strong_as_the_file_says_is_no_finding(seed):
     runs = recordings(cart(), seed)

@@ -217,7 +217,7 @@ entries = st.fixed_dictionaries(
 ) | sizes  # fmt: skip
 
 
-@fuzz
+@settings(fuzz, max_examples=60)
 @given(
     numbers=st.dictionaries(st.sampled_from(["X_u", "Z_w", "M_q", "Z_q", "X_0", "Z_delta_r", "M_udot"]), entries),
     mass=st.floats(1e-3, 1e6), arm=st.lists(sizes, min_size=3, max_size=3),

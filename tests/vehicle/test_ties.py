@@ -72,6 +72,7 @@ def test_tie_is_written_as_it_was_read(make):
     assert float(moved.get("K_delta_el", -moved.get("K_b", 0.0) + 2 * 9.0 - 0.2 - 9.0)) == pytest.approx(-9.0)
 
 
+@pytest.mark.long
 def test_fit_of_tied_fins_counts_them_once_and_knows_them_better():
     """Claim: a tie makes the coefficient better known than both free, and is in the fit to the last digit."""
     truth = hull(K_delta_el="0.8 * K_delta_er", Y_delta_el="Y_delta_er")
