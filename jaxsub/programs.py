@@ -85,14 +85,22 @@ class _Place:
     index: int
 
 
+def _is_place(part: Any) -> bool:
+    return isinstance(part, _Place)
+
+
+# a constant, which is traced where everything is; compiled, since it is asked at every call
+_constant = jax.jit(lambda: 0.0)
+
+
 def _traced(arrays: Sequence[Any]) -> bool:
     """Whether any of `arrays` is being traced, or everything is."""
-    return any(isinstance(value, Tracer) for value in (*arrays, jax.device_put(0.0)))
+    return any(isinstance(value, Tracer) for value in (*arrays, _constant()))
 
 
 def _kind(leaf: Any) -> Hashable:
     """What a program depends on of a leaf: of an array its shape and kind of numbers, else the leaf itself."""
-    return (leaf.shape, str(leaf.dtype), getattr(leaf, "weak_type", False)) if eqx.is_array(leaf) else leaf
+    return (leaf.shape, leaf.dtype, getattr(leaf, "weak_type", False)) if eqx.is_array(leaf) else leaf
 
 
 def _kept(folder: Path, function: Callable, args: Any, kwargs: Any) -> _Call | None:
@@ -107,7 +115,9 @@ def _kept(folder: Path, function: Callable, args: Any, kwargs: Any) -> _Call | N
     run.__name__ = function.__name__
     # what such a program returns is bound to its device: without `in_shardings` it would be compiled again for that
     compiled = jax.jit(run, in_shardings=jax.sharding.SingleDeviceSharding(jax.devices()[0]))
-    return lambda arrays: _filled(result, compiled(*arrays))
+    parts, built = jax.tree.flatten(result, is_leaf=_is_place)
+    filled = lambda arrays: [arrays[part.index] if _is_place(part) else part for part in parts]
+    return lambda arrays: jax.tree.unflatten(built, filled(compiled(*arrays)))
 
 
 def _made(path: Path, function: Callable, args: Any, kwargs: Any) -> tuple[export.Exported, Any]:
@@ -161,9 +171,3 @@ def _load_lapack() -> None:
     https://github.com/jax-ml/jax/issues/29610
     """
     jax.jit(jax.lax.linalg.cholesky).lower(jnp.eye(1))
-
-
-def _filled(result: Any, arrays: Sequence[Any]) -> Any:
-    """The result with the `arrays` in their places."""
-    is_place = lambda part: isinstance(part, _Place)
-    return jax.tree.map(lambda part: arrays[part.index] if is_place(part) else part, result, is_leaf=is_place)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy import special
 
-from ..effects import AbstractEffect, admissible, amplitudes, numbers, with_numbers
+from ..effects import AbstractEffect, admitted, amplitudes, numbers, with_numbers
 from ..likelihood import Disturbance
 from .columns import plausible
 from .evidence import FIRST, Evidence, Products
@@ -58,9 +58,27 @@ class _WithAmplitudes(Sequence[AbstractEffect]):
     def __getitem__(self, index):
         return predict(self._candidates[index], self._sizes[index])[0]
 
-    def admissible(self, index: int) -> bool:
-        """Whether physics admits the numbers of one of them."""
-        return predictable(self._candidates[index], self._sizes[index])
+
+class _Admitted:
+    """Between which values physics admits the amplitudes of candidates, all their columns one after the other."""
+
+    def __init__(self, candidates: Sequence[AbstractEffect]):
+        bounds: list[tuple[float, float]] = []
+        self._first, self._shapes = [], []
+        for effect in candidates:
+            self._first.append(len(bounds))
+            own, names = admitted(effect), amplitudes(effect)
+            # a lag that wants to be of the other sign shows as a negative share of its own grid value
+            bounds += [own[name] for name in names] or [(np.nextafter(0.0, 1.0), np.inf), (-np.inf, np.inf)]
+            shapes = {name: value for name, value in numbers(effect).items() if name not in names}
+            self._shapes.append(not names or all(own[n][0] <= value <= own[n][1] for n, value in shapes.items()))
+        self._low, self._high = np.array(bounds).reshape(-1, 2).T
+
+    def __call__(self, sizes: Sequence[np.ndarray]) -> np.ndarray:
+        """(m,) whether physics admits each candidate with its amplitudes `sizes`."""
+        flat = np.concatenate([np.zeros(0), *sizes])
+        within = (self._low <= flat) & (flat <= self._high)
+        return np.logical_and.reduceat(within, self._first) & self._shapes if len(flat) else np.zeros(0, bool)
 
 
 class Selector:
@@ -86,6 +104,7 @@ class Selector:
         labels = collections.Counter(effect.name for effect in {e.label: e for e in self.candidates}.values())
         among = [looked_at.get(effect.name, 0) / labels[effect.name] for effect in self.candidates]
         self.forms = np.maximum(among, 1.0)
+        self._admitted = _Admitted(self.candidates)
         self._begin()
 
     def _begin(self) -> None:
@@ -137,18 +156,15 @@ class Selector:
                 # twice the gain in likelihood, the disturbances of both their own
                 best[i], sizes[i] = values[i], gains.amplitudes[i]
                 statistic[i] = max(0.0, gains.statistic[i] + 2.0 * (at - base))
-        effects = _WithAmplitudes(
-            self.candidates, [a / self.evidence.length[o] for a, o in zip(sizes, self.owners, strict=True)]
-        )
-        taken = {self.candidates[i].label for i in chosen}
-        right = []
-        for i, effect in enumerate(self.candidates):
-            good = bool(self.usable[i]) and effect.label not in taken and effects.admissible(i)
-            # worth a look only where it may be chosen
-            right.append(good and (statistic[i] < PLAUSIBILITY_SCORE or plausible(self.evidence.view, effects[i])))
-        fine = np.array(right) & (len(own) + np.array([len(columns) for columns in self.owners]) <= MOST_COLUMNS)
+        sizes = [a / self.evidence.length[o] for a, o in zip(sizes, self.owners, strict=True)]
+        effects, taken = _WithAmplitudes(self.candidates, sizes), {self.candidates[i].label for i in chosen}
+        right = self.usable & self._admitted(sizes) & [effect.label not in taken for effect in self.candidates]
+        # worth a look only where it may be chosen
+        for i in np.flatnonzero(right & (statistic >= PLAUSIBILITY_SCORE)):
+            right[i] = plausible(self.evidence.view, effects[i])
+        fine = right & (len(own) + np.array([len(columns) for columns in self.owners]) <= MOST_COLUMNS)
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
-        return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, np.array(right))
+        return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, right)
 
     def hidden(self, chosen: Sequence[int]) -> list[int]:
         """The best candidates on top of `chosen` under smaller disturbances, which may have absorbed them."""
@@ -237,19 +253,6 @@ class Selector:
 
 
 def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:
-    """An effect with predicted parameters, and whether physics admits them."""
-    values = _predicted_numbers(effect, amplitude)
-    return with_numbers(effect, values) if values else effect, predictable(effect, amplitude)
-
-
-def predictable(effect: AbstractEffect, amplitude: np.ndarray) -> bool:
-    """Whether physics admits an effect with these amplitudes."""
-    values = _predicted_numbers(effect, amplitude)
-    # a lag that wants to be of the other sign shows as a negative share of its own grid value
-    return admissible(effect, {**numbers(effect), **values}) if values else bool(amplitude[0] > 0.0)
-
-
-def _predicted_numbers(effect: AbstractEffect, amplitude: np.ndarray) -> dict[str, float]:
-    """The amplitudes by field; none of an effect that is not linear in any."""
-    names = amplitudes(effect)
-    return dict(zip(names, amplitude.tolist(), strict=True)) if names else {}
+    """An effect with predicted amplitudes, and whether physics admits them."""
+    values = dict(zip(amplitudes(effect), amplitude.tolist(), strict=False))
+    return with_numbers(effect, values) if values else effect, bool(_Admitted([effect])([amplitude])[0])

@@ -341,8 +341,16 @@ def stacked(effects: Sequence[AbstractEffect]) -> list[tuple[list[int], Any]]:
 
 def admissible(effect: AbstractEffect, values: dict[str, float]) -> bool:
     """Whether each of the `values` (SI) of `effect` has a sign that physics permits and is no larger than it admits."""
-    within = all(abs(values[field.name]) <= field.metadata["most"] for field in number_fields(effect))
-    return within and all(values[name] * sign >= 0.0 for name, sign in effect.signs().items())
+    return all(low <= values[name] <= high for name, (low, high) in admitted(effect).items())
+
+
+def admitted(effect: AbstractEffect) -> dict[str, tuple[float, float]]:
+    """Between which values (SI) physics admits each numeric field of `effect`, by its sign and its largest size."""
+    signs, found = effect.signs(), {}
+    for field in number_fields(effect):
+        most, sign = field.metadata["most"], signs.get(field.name, 0)
+        found[field.name] = (0.0 if sign > 0 else -most), (0.0 if sign < 0 else most)
+    return found
 
 
 def with_numbers(effect: AbstractEffect, values: Mapping[str, ArrayLike]) -> Any:

@@ -64,9 +64,7 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
             coefficients[name] = _number_table(own[name], row, Parameter(name), unit)
     document["coefficients"] = coefficients
     said = lambda name: tied.get(name) or _number_table(own[name], rows.get(name), Parameter(name, free=False))
-    entry = lambda name, column: column_entry(
-        name, column, dict(layout.input_units).get(name, ""), vehicle.sensors, said
-    )
+    entry = lambda name, column: column_entry(name, column, dict(layout.input_units).get(name), vehicle.sensors, said)
     if layout.inputs:
         document["inputs"] = {name: entry(name, column) for name, column in layout.inputs}
     tables, stages = actuator_tables(devices, vehicle.effects, rows, tied, _number_table)

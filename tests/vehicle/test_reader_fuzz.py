@@ -244,3 +244,13 @@ def test_what_is_written_is_read(numbers, mass, arm, name, mean, free):
         assert rows[symbol].prior_std == entry.get("prior_std", math.inf)
         assert [rows[symbol].lower, rows[symbol].upper] == entry.get("bounds", [-math.inf, math.inf])
     comes_back(vehicle)
+
+
+def test_that_an_input_has_no_dimension_comes_back():
+    """Claim: `unit = ""` is written and read again, unlike no unit, with which an actuator may say it."""
+    tree = tomllib.loads(ACTUATED)
+    for unit, said in (("", 'm2", unit = ""'), (None, '"m2"')):
+        tree["inputs"]["starboard"] = {"column": "m2"} | ({} if unit is None else {"unit": unit})
+        vehicle = vehicle_from(tree, "vehicle.toml")
+        assert said in vehicle_text(vehicle)
+        comes_back(vehicle)

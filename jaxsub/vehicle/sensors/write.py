@@ -54,14 +54,15 @@ def _table(name: str, outputs: tuple[Output, ...], sensors: Sensors, said: Said)
     return table
 
 
-def column_entry(name: str, column: str, unit: str, sensors: Sensors, said: Said) -> Any:
+def column_entry(name: str, column: str, unit: str | None, sensors: Sensors, said: Said) -> Any:
     """What a file says of an input or a prescribed motion: its column, with `unit`, scale and offset if it has any."""
     lines = {key: said(f"{name}.{key}") for key in ("scale", "offset") if f"{name}.{key}" in sensors.numbers}
-    if not unit and not lines:
+    if unit is None and not lines:
         return column
     table = tomlkit.inline_table()
     table["column"] = column
-    if unit:
+    # that it has no dimension is said too: no unit is another thing
+    if unit is not None:
         table["unit"] = unit
     table.update(lines)
     return table
