@@ -236,6 +236,7 @@ def facts(view: View) -> Facts:
         quantities=quantities_of(layout.outputs, body),
         has=view.vehicle.has,
         fixed_gains=view.vehicle.fixed_gains,
+        density=view.vehicle.density,
     )
 
 

@@ -10,9 +10,7 @@ from jaxtyping import Array, Float
 from ..arrays import Values, namespace
 from .base import AbstractDerivative, AbstractForce, amplitude
 from .derivatives import Derivative
-from .motion import EQUATIONS, FORCES, VELOCITIES, Facts, Motion, Signal, unit_per
-
-WATER_DENSITY = 1025.0
+from .motion import EQUATIONS, FORCES, STANDARD_DENSITY, VELOCITIES, Facts, Motion, Signal, unit_per
 
 
 class CrossflowDrag(AbstractForce):
@@ -30,13 +28,15 @@ class CrossflowDrag(AbstractForce):
     length: float = eqx.field(static=True)
     diameter: float = eqx.field(static=True)
     C_d: Array = amplitude("1", sign=+1)
+    density: float = eqx.field(static=True, default=STANDARD_DENSITY)
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[CrossflowDrag]":
         """The planes in which the vehicle is free to both translate and turn."""
         planes = {"horizontal": {"sway", "yaw"}, "vertical": {"heave", "pitch"}}
         free = set(facts.equations) if facts.kind == "submerged-body" else set()
-        return [cls(plane, facts.length, facts.diameter) for plane, needs in planes.items() if needs <= free]
+        sizes = {"length": facts.length, "diameter": facts.diameter, "density": facts.density}
+        return [cls(plane, **sizes) for plane, needs in planes.items() if needs <= free]
 
     @property
     def where(self) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ class CrossflowDrag(AbstractForce):
         nodes, weights = np.polynomial.legendre.leggauss(16)
         x, dx = 0.5 * self.length * nodes, 0.5 * self.length * weights
         local = motion.flow[across][..., None] + arm * x * motion.flow[turning][..., None]
-        strips = -0.5 * WATER_DENSITY * self.diameter * self.C_d * abs(local) * local * dx
+        strips = -0.5 * self.density * self.diameter * self.C_d * abs(local) * local * dx
         total = namespace(strips).sum
         return {across: total(strips, -1), turning: total(arm * x * strips, -1)}
 

@@ -9,7 +9,7 @@ from jaxtyping import Array
 
 from ..arrays import namespace
 from .base import AbstractForce, amplitude
-from .motion import GRAVITY, Facts, Motion, Signal
+from .motion import GRAVITY, STANDARD_DENSITY, Facts, Motion, Signal
 
 REFERENCE_TEMPERATURE = 288.15
 
@@ -134,11 +134,12 @@ class HullCompressibility(_ExtraBuoyancy):
     name: ClassVar[str] = "hull-compressibility"
     family: ClassVar[str] = "hydrostatics"
     kappa: Array = amplitude("1/Pa", sign=+1)
+    density: float = eqx.field(static=True, default=STANDARD_DENSITY)
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[HullCompressibility]":
         """One, for a body free in surge or heave."""
-        return [cls()] if _floats(facts) else []
+        return [cls(density=facts.density)] if _floats(facts) else []
 
     @property
     def expression(self) -> str:
@@ -147,7 +148,7 @@ class HullCompressibility(_ExtraBuoyancy):
 
     def newton(self, motion: Motion) -> Signal:
         """Extra buoyancy, N."""
-        return -motion.buoyancy * self.kappa * 1025.0 * GRAVITY * motion.positions["z"]
+        return -motion.buoyancy * self.kappa * self.density * GRAVITY * motion.positions["z"]
 
 
 class DensityStratification(_ExtraBuoyancy):

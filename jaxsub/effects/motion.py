@@ -16,6 +16,8 @@ VELOCITIES: dict[str, str] = dict(zip(EQUATIONS, "uvwpqr", strict=True))
 FORCES: dict[str, str] = dict(zip(EQUATIONS, "XYZKMN", strict=True))
 FORCE_UNITS: dict[str, str] = dict(zip(EQUATIONS, ["N"] * 3 + ["N m"] * 3, strict=True))
 GRAVITY = 9.80665
+# kg/m³, of sea water
+STANDARD_DENSITY = 1025.0
 PROPULSION = ("shaft_speed", "thrust")
 FINS = ("rudder", "elevator_right", "elevator_left", "elevator", "stern_plane")
 _CHANNELS = {
@@ -123,7 +125,7 @@ class Facts(eqx.Module):
     - `kind`: `submerged-body` or `mechanism`.
     - `equations`: the free equations of motion.
     - `actuators`, `channels`, `environment`: names of what is recorded.
-    - `length`, `diameter`: of the hull, m (zero for a mechanism).
+    - `length`, `diameter`: of the hull, m (zero for a mechanism). `density`: of the water that it was made for, kg/m³.
     - `rate_scale`: rms velocity of each free equation along the recordings.
     - `sample_interval`: the recordings' median, s. `duration`: of the longest, s.
     - `position_scale`: largest size of each coordinate of a mechanism.
@@ -160,6 +162,7 @@ class Facts(eqx.Module):
     quantities: dict[str, str] = eqx.field(default_factory=dict)
     has: frozenset[str] = frozenset()
     fixed_gains: tuple[str, ...] = ()
+    density: float = STANDARD_DENSITY
 
     @property
     def shown(self) -> dict[str, str]:

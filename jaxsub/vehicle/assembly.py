@@ -5,7 +5,7 @@ import math
 
 import jax.numpy as jnp
 
-from ..effects import EQUATIONS, GRAVITY, AbstractEffect, derivative, parameter_table
+from ..effects import EQUATIONS, GRAVITY, STANDARD_DENSITY, AbstractEffect, derivative, parameter_table
 from ..errors import InputError
 from ..parameters import Parameter, number
 from .actuators import Actuators, stage_numbers
@@ -27,7 +27,7 @@ from .layout import deviation
 from .mechanism import Mechanism
 from .own import Model, OwnModel, check_model, model_of
 from .products import Products
-from .restoring import STANDARD_DENSITY, Restoring
+from .restoring import Restoring
 from .schema import unknown_key
 from .sensors import Output, Sensors
 from .submerged_body import SubmergedBody

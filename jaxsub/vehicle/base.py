@@ -11,6 +11,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from ..arrays import Values
 from ..effects import (
+    STANDARD_DENSITY,
     AbstractActuation,
     AbstractActuator,
     AbstractEffect,
@@ -79,6 +80,11 @@ class AbstractVehicle(eqx.Module):
     def has(self) -> frozenset[str]:
         """What it contains of what an effect could say (`Facts.has`): free scales and offsets of its sensors."""
         return frozenset(row.name for row in self.layout.free if row.name in self.sensors.numbers)
+
+    @property
+    def density(self) -> float:
+        """Of the water that its numbers are for, kg/m³."""
+        return STANDARD_DENSITY
 
     @property
     @abc.abstractmethod

@@ -5,10 +5,8 @@ from collections.abc import Mapping
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from ..effects import GRAVITY, Signal
+from ..effects import GRAVITY, STANDARD_DENSITY, Signal
 from .inertia import CENTRE_OF_GRAVITY
-
-STANDARD_DENSITY = 1025.0
 
 
 class Restoring(eqx.Module):

@@ -159,6 +159,11 @@ class SubmergedBody(AbstractVehicle):
         return super().has.union(own)
 
     @property
+    def density(self) -> float:
+        """Its `reference_density`."""
+        return self.restoring.reference_density
+
+    @property
     def fixed_gains(self) -> tuple[str, ...]:
         """The devices whose `gain` is not free, and inputs of which not every coefficient is."""
         return self.actuation.fixed_gains(self.layout)

@@ -7,7 +7,8 @@ from typing import Any
 
 import tomlkit
 
-from ..effects import AbstractEffect, options, parameter_table
+from ..effects import AbstractEffect, parameter_table
+from ..effects.base import option_fields
 from ..errors import OutputError
 from ..parameters import Parameter
 from ..storage import written_whole
@@ -110,9 +111,9 @@ def _body_table(vehicle: SubmergedBody, values: dict[str, float], rows: dict[str
 def _effect_table(effect: AbstractEffect, rows: dict[str, Parameter]) -> Any:
     table = tomlkit.table()
     table["effect"] = effect.name
-    given = {name: value for name, value in options(effect).items() if value != math.inf}
-    for name, value in given.items():
-        table[name.rstrip("_")] = list(value) if isinstance(value, tuple) else value
+    for field in option_fields(type(effect)):
+        if (value := getattr(effect, field.name)) != field.default:
+            table[field.name.rstrip("_")] = list(value) if isinstance(value, tuple) else value
     table["expression"] = effect.expression
     symbols, numbers = effect.symbols(), parameter_table(effect)
     written = lambda field, row: _number_table(float(getattr(effect, field)), rows.get(row.name), row)

@@ -63,6 +63,17 @@ def test_crossflow_drag_is_the_integral_along_the_hull(plane, sign):
         np.testing.assert_allclose([found[across][i], found[turning][i]], [side, moment], rtol=2e-3, atol=0.2)
 
 
+@pytest.mark.parametrize(("kind", "number"), [("crossflow-drag", "C_d"), ("hull-compressibility", "kappa")])
+def test_an_effect_offered_to_a_vehicle_is_of_its_water(kind, number):
+    """Claim: of fresh water, 1000 kg/m³, a vehicle's effects have that density, and forces in its proportion."""
+    one = lambda facts: next(effect for effect in candidates(facts) if effect.name == kind)
+    now = motion(BODY, count=5)
+    fresh, sea = (sized(one(facts), [0.7]).force(now) for facts in (dataclasses.replace(BODY, density=1000.0), BODY))
+    for equation, force in fresh.items():
+        np.testing.assert_allclose(force, sea[equation] * (1000.0 / 1025.0), rtol=1e-12)
+    assert number in amplitudes(one(BODY))
+
+
 def test_crossflow_drag_without_a_kink_is_exact():
     now = motion(BODY, count=6)
     now.rates["sway"] = 5.0 + now.rates["sway"]

@@ -12,9 +12,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...arrays import Values
-from ...effects import EQUATIONS, Derivative, Motion, Signal
+from ...effects import EQUATIONS, STANDARD_DENSITY, Derivative, Motion, Signal
 from ...parameters import number
-from ..restoring import STANDARD_DENSITY
 from .keys import Key
 
 # a size (N or N m), which is an array or a number of NumPy's, and the generalised force (6,) of one such in body axes

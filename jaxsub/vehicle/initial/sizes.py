@@ -4,8 +4,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Self
 
+from ...effects import STANDARD_DENSITY
 from ...errors import InputError
-from ..restoring import STANDARD_DENSITY
 
 # of each dimension its SI unit
 SIZES: dict[str, str] = {
