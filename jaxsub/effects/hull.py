@@ -35,8 +35,8 @@ class CrossflowDrag(AbstractForce):
         """The planes in which the vehicle is free to both translate and turn."""
         planes = {"horizontal": {"sway", "yaw"}, "vertical": {"heave", "pitch"}}
         free = set(facts.equations) if facts.kind == "submerged-body" else set()
-        sizes = {"length": facts.length, "diameter": facts.diameter, "density": facts.density}
-        return [cls(plane, **sizes) for plane, needs in planes.items() if needs <= free]
+        made = lambda plane: cls(plane, facts.length, facts.diameter, density=facts.density)
+        return [made(plane) for plane, needs in planes.items() if needs <= free]
 
     @property
     def where(self) -> tuple[str, ...]:
