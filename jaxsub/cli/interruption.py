@@ -137,8 +137,9 @@ def interruptible(of: Callable[[], T], watch: Watch | None) -> T:
         except BaseException as error:
             future.set_exception(error)
 
-    threading.Thread(target=work, name=_APART, daemon=True).start()
     try:
+        # which waits for the thread to begin: a signal may come meanwhile too
+        threading.Thread(target=work, name=_APART, daemon=True).start()
         return future.result()
     except KeyboardInterrupt:
         if watch is not None:

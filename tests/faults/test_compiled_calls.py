@@ -4,13 +4,14 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 from commands import environment
 from rigs import write_rig
 from trees import tree
 
-from jaxsub.cli.interruption import Watch
+from jaxsub.cli.interruption import Watch, interruptible
 from jaxsub.cli.output import fresh_folder
 
 ENDLESS = """
@@ -102,6 +103,26 @@ def test_last_word_is_said_once():
         for thread in threads:
             thread.join()
     assert said == [1]
+
+
+def test_a_signal_while_a_call_begins_is_answered(monkeypatch):
+    """Claim: one that comes before the call's thread is waited for stops the clock as a later one does."""
+    start, threads = threading.Thread.start, []
+
+    def interrupted(thread):
+        start(thread)
+        threads.append(thread)
+        if thread.name.startswith("jaxsub"):
+            signal.raise_signal(signal.SIGINT)
+
+    with Watch(lambda: "") as watch:
+        monkeypatch.setattr(threading.Thread, "start", interrupted)
+        monkeypatch.setattr("jaxsub.cli.interruption.GRACE", 0.2)
+        with pytest.raises(KeyboardInterrupt):
+            interruptible(lambda: None, watch)
+        # without an answer the process of this test has ended by now
+        time.sleep(0.6)
+    assert len(threads) == 1
 
 
 def test_identify_keeps_the_fit(tmp_path):
