@@ -1,7 +1,7 @@
 """`python -m experiments.watch --out DIR [--quick]`: false alarms, delays, places and speed of `jaxsub watch`.
 
 Truths have equations of their own (`truth.py`); the watcher is calibrated on four clean hours. `results.json`: false
-alarms of 100 clean hours beside the stated rate, with and without disturbance forces; delay and place of five faults,
+alarms of 100 clean hours beside the stated rate, with and without disturbance forces; delay and place of seven faults,
 beside a fixed threshold of innovations and the fuzzy rule, both set to the largest value of the same clean hours;
 milliseconds a sample, and memory.
 """
@@ -30,6 +30,8 @@ _RIGHT = {
     FAULTS[2]: {"surge", "sway", "yaw"},
     FAULTS[3]: {"surge"},
     FAULTS[4]: {"sensor:psi"},
+    FAULTS[5]: {"sensor:u"},
+    FAULTS[6]: {"sensor:r"},
 }
 _HOUR, _QUIET = 3600.0, 60.0
 # clean hours whose largest values are the limits of the other detectors
@@ -97,15 +99,19 @@ def false_alarms(watcher: Watcher, series: Series, rate: float) -> dict:
 
 def detected(series: Series, limit: float, fault: int, each: int) -> dict:
     """Delays and places of the first alarm after the onset, of the runs of a fault."""
-    delays, places, early = [], [], 0
+    delays, places, among, early = [], [], [], 0
     onset = round(ONSET / DT)
     for run in range(fault * each, (fault + 1) * each):
         early += bool(np.any(series.statistic[run, 300:onset] > limit))
         late = np.flatnonzero(series.statistic[run, onset:] > limit)
         if late.size:
             delays.append(float(late[0] * DT))
-            places.append(PLACES[int(series.place[run, onset + late[0]])])
+            at = run, onset + late[0]
+            places.append(PLACES[int(series.place[at])])
+            named = np.arange(len(PLACES)) == series.place[at] if series.likely is None else series.likely[at]
+            among.append({PLACES[i] for i in np.flatnonzero(named)})
     right = sum(place in _RIGHT[FAULTS[fault]] for place in places)
+    among_right = sum(bool(own & _RIGHT[FAULTS[fault]]) for own in among)
     return {
         "fault": FAULTS[fault],
         "runs": each,
@@ -114,6 +120,8 @@ def detected(series: Series, limit: float, fault: int, each: int) -> dict:
         "delay_median": float(np.median(delays)) if delays else None,
         "delay_largest": max(delays, default=None),
         "right_place": right,
+        "right_among": among_right,
+        "places_named": float(np.mean([len(own) for own in among])) if among else None,
         "places": {place: places.count(place) for place in sorted(set(places))},
     }
 

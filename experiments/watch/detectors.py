@@ -29,11 +29,15 @@ PLACES = (*_EQUATIONS, *(f"sensor:{channel}" for channel in _CHANNELS))
 
 
 class Series(NamedTuple):
-    """Of R runs of K samples a statistic (R, K) and the number of the place (R, K) where it is largest."""
+    """Of R runs of K samples a statistic (R, K) and the number of the place (R, K) where it is largest.
+
+    `likely` (R, K, P) are the places that it says cannot be told from that.
+    """
 
     statistic: np.ndarray
     place: np.ndarray
     since: np.ndarray | None = None
+    likely: np.ndarray | None = None
 
 
 def watched(watcher: Watcher, runs: Runs) -> Series:
@@ -41,18 +45,20 @@ def watched(watcher: Watcher, runs: Runs) -> Series:
     begun = jnp.stack(
         [watcher.monitor.start(initial_state(watcher.model, own[:16])).stream.filter.x for own in runs.rows]
     )
-    statistic, change, age, recovered = map(np.asarray, _watched(watcher.monitor, begun, jnp.asarray(runs.rows)))
+    found = _watched(watcher.monitor, begun, jnp.asarray(runs.rows))
+    statistic, change, age, recovered, likely = map(np.asarray, found)
     jumped = recovered.any(axis=-1)
     place = np.where(jumped, len(_EQUATIONS) + np.argmax(recovered, axis=-1), change)
     # a sensor that is believed again after it jumped is an alarm whatever the statistic
-    return Series(np.where(jumped, np.inf, statistic), place, runs.rows[..., 0] - DT * age)
+    likely = np.where(np.expand_dims(jumped, -1), np.arange(len(PLACES)) == place[..., None], likely)
+    return Series(np.where(jumped, np.inf, statistic), place, runs.rows[..., 0] - DT * age, likely)
 
 
 @compiled
 def _watched(monitor: Monitor, begun, rows):
     def step(state, row):
         after, found = monitor.step(state, row)
-        return after, (found.statistic, found.change, found.age, found.recovered)
+        return after, (found.statistic, found.change, found.age, found.recovered, found.likely)
 
     def run(z, own):
         return jax.lax.scan(step, monitor.start(z[: -len(_EQUATIONS)]), own)[1]

@@ -32,9 +32,10 @@ def _detection(results: dict) -> str:
 
 
 def _said(one: dict) -> str:
-    """Detected, right place and median delay of the runs of a fault."""
+    """Detected, right place, alone or among those that cannot be told apart, and median delay of a fault's runs."""
     delay = "never" if one["delay_median"] is None else f"{one['delay_median']:.0f} s"
-    return f"{one['detected']} of {one['runs']}, place {one['right_place']}, {delay}"
+    more = f" or {one['right_among']}" if one["places_named"] and one["places_named"] > 1.0 else ""
+    return f"{one['detected']} of {one['runs']}, place {one['right_place']}{more}, {delay}"
 
 
 def _speed(speed: dict) -> str:

@@ -12,12 +12,16 @@ DT = 0.2
 ONSET = 600.0
 # s over which drag grows
 GROWTH = 3600.0
-FAULTS = ("thruster loses 20 %", "fin sticks", "current sets in", "drag grows 10 % in an hour", "compass jumps")
+FAULTS = (
+    "thruster loses 20 %", "fin sticks", "current sets in", "drag grows 10 % in an hour",
+    "compass jumps", "speed log is off", "gyro is off",
+)  # fmt: skip
 # of the forces in surge and sway (N) and the moment in yaw (N m) that come and go within some seconds
 DISTURBANCE, SLOWNESS = np.array([1.0, 1.0, 0.5]), 3.0
 SIGMA = np.array([0.01, 0.01, 0.003, 0.01])
 _INERTIA = np.array([65.0, 120.0, 32.0])
-_RADIANS = 0.1  # of the compass
+# by how much sensors are off: the compass (rad), the speed log (m/s) and the gyro (rad/s)
+_OFF = {"compass jumps": (3, 0.1), "speed log is off": (0, 0.03), "gyro is off": (2, 0.01)}
 _DRIFT = 0.15  # m/s of the current, over ground
 
 
@@ -75,9 +79,9 @@ def simulate(faults: list[str | None], seconds: float, seed: int, coloured: bool
         after = keep * d + np.sqrt(1.0 - keep**2) * size * rng.standard_normal((R, 3))
         state = _step(state, k * DT, steer[:, k], thrust[:, k], which, d, after)
         d = after
-    late = (np.arange(K) * DT >= ONSET) & (which == FAULTS.index("compass jumps"))[:, None]
-    measured = shown + SIGMA * rng.standard_normal(shown.shape)
-    measured[..., 3] += _RADIANS * late
+    measured, late = shown + SIGMA * rng.standard_normal(shown.shape), np.arange(K) * DT >= ONSET
+    for fault, (channel, size) in _OFF.items():
+        measured[..., channel] += size * (late & (which == FAULTS.index(fault))[:, None])
     times = np.broadcast_to(DT * np.arange(K), (R, K))
     return Runs(np.concatenate([np.stack([times, steer, thrust], axis=-1), measured], axis=-1))
 

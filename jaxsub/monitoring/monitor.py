@@ -4,6 +4,7 @@ Nothing a row holds makes a number but finite, and the state has the same size a
 """
 
 import dataclasses
+import math
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,6 +14,9 @@ from ..filter import DisturbedProcess, Drive, Estimate, ExtendedKalmanFilter, Sa
 from ..methods import jittable
 from ..navigation import AbstractStream, Reading, Stream, StreamState
 from .signatures import Linearisation, Signatures, scored, squares, whitened, window_lengths
+
+# of z², odds of 20 to 1: changes that are no farther below the largest cannot be told from it yet
+_UNTOLD = 2.0 * math.log(20.0)
 
 
 class AlarmTest(eqx.Module):
@@ -55,7 +59,7 @@ class Observation(eqx.Module):
     - `taken`: whether the row was used; where not, all else is of the row before.
     - `statistic`: the largest z² of any change in any window, over its variance; `change`: which of the n + c; `age`:
       samples since the window began; `size`: the change's estimated size, N, N m or the channel's sigma; `size_std`:
-      its standard deviation.
+      its standard deviation. `likely`: (n + c,) changes that explain nearly as much, it among them.
     - `raised`, `ended`: whether an alarm begins or ends. `recovered`: (c,) channels that are believed again although
       they jumped.
     - `estimate`: of the filter.
@@ -67,6 +71,7 @@ class Observation(eqx.Module):
     age: Int[Array, ""]
     size: Float[Array, ""]
     size_std: Float[Array, ""]
+    likely: Bool[Array, " q"]
     raised: Bool[Array, ""]
     ended: Bool[Array, ""]
     recovered: Bool[Array, " c"]
@@ -213,6 +218,7 @@ class Monitor(AbstractStream):
             jnp.minimum(state.signatures.age[window], jnp.asarray(window_lengths(len(z2)))[window]),
             state.score[window, change] / known,
             1.0 / jnp.sqrt(known),
+            jnp.max(z2, axis=0) > statistic - _UNTOLD,
             above & ~state.alarm,
             ended,
             recovered,

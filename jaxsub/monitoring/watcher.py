@@ -154,6 +154,7 @@ class Watcher:
             "time": self.time,
             "since": since,
             "place": place,
+            "or": [] if jumped else [self.places[i] for i in np.flatnonzero(found.likely) if i != c],
             "statistic": float(found.statistic),
             "threshold": self.threshold,
             "false_alarms_per_hour": min(self.rate, self.tail.rate_of(float(found.statistic))),

@@ -70,6 +70,15 @@ def test_a_bias_is_an_alarm_at_its_sensor_since_it_set_in(flow):
     assert first["false_alarms_per_hour"] <= RATE
 
 
+def test_what_cannot_be_told_from_the_place_is_listed(flow):
+    """Claim: the sensor that errs is the place of every event about it, or among what explains it nearly as well."""
+    first, *later = [event for event in flow[0] + flow[1] if "place" in event]
+    assert first["or"] == [] and any(event["or"] for event in later)
+    for event in (first, *later):
+        assert event["place"] not in event["or"]
+        assert "sensor:x" in (event["place"], *event["or"])
+
+
 def test_a_watcher_restored_from_its_file_gives_the_same_events(flow):
     """Claim: written in the midst of a change, read by a new watcher, events and counts go on the same."""
     _, rest, again, watcher, restored, _ = flow
