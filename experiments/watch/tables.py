@@ -34,7 +34,7 @@ def _detection(results: dict) -> str:
 def _said(one: dict) -> str:
     """Detected, right place, alone or among those that cannot be told apart, and median delay of a fault's runs."""
     delay = "never" if one["delay_median"] is None else f"{one['delay_median']:.0f} s"
-    more = f" or {one['right_among']}" if one["places_named"] and one["places_named"] > 1.0 else ""
+    more = f" or {one['right_among']}" if one["right_among"] > one["right_place"] else ""
     return f"{one['detected']} of {one['runs']}, place {one['right_place']}{more}, {delay}"
 
 
