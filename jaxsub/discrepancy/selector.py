@@ -158,7 +158,8 @@ class Selector:
                 statistic[i] = max(0.0, gains.statistic[i] + 2.0 * (at - base))
         sizes = [a / self.evidence.length[o] for a, o in zip(sizes, self.owners, strict=True)]
         effects, taken = _WithAmplitudes(self.candidates, sizes), {self.candidates[i].label for i in chosen}
-        right = self.usable & self._admitted(sizes) & [effect.label not in taken for effect in self.candidates]
+        fresh = np.array([effect.label not in taken for effect in self.candidates], bool)
+        right = self.usable & self._admitted(sizes) & fresh
         # worth a look only where it may be chosen
         for i in np.flatnonzero(right & (statistic >= PLAUSIBILITY_SCORE)):
             right[i] = plausible(self.evidence.view, effects[i])

@@ -18,7 +18,8 @@ class CrossflowDrag(AbstractForce):
 
     $Y = -\tfrac12\rho D C_d \int_{-L/2}^{L/2} |v + xr|(v + xr)\,dx$ and
     $N = -\tfrac12\rho D C_d \int_{-L/2}^{L/2} x\,|v + xr|(v + xr)\,dx$;
-    in the vertical plane with $w - xq$, $Z$ and $M$, the last with the opposite sign. $C_d \ge 0$.
+    in the vertical plane with $w - xq$, $Z$ and $M$, the last with the opposite sign. $C_d \ge 0$, and $\rho$ is the
+    `density`, kg/m³.
     Source: Fossen (2021), §6.4.2; Healey and Lienard (1993).
     """
 
