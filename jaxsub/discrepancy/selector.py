@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy import special
 
-from ..effects import AbstractEffect, admitted, amplitudes, numbers, with_numbers
+from ..effects import AbstractEffect, admissible, admitted, amplitudes, numbers, with_numbers
 from ..likelihood import Disturbance
 from .columns import plausible
 from .evidence import FIRST, Evidence, Products
@@ -70,8 +70,8 @@ class _Admitted:
             own, names = admitted(effect), amplitudes(effect)
             # a lag that wants to be of the other sign shows as a negative share of its own grid value
             bounds += [own[name] for name in names] or [(np.nextafter(0.0, 1.0), np.inf), (-np.inf, np.inf)]
-            shapes = {name: value for name, value in numbers(effect).items() if name not in names}
-            self._shapes.append(not names or all(own[n][0] <= value <= own[n][1] for n, value in shapes.items()))
+            # an amplitude of zero is always admitted, so that this asks about the shapes alone
+            self._shapes.append(not names or admissible(effect, numbers(effect) | dict.fromkeys(names, 0.0)))
         self._low, self._high = np.array(bounds).reshape(-1, 2).T
 
     def __call__(self, sizes: Sequence[np.ndarray]) -> np.ndarray:
@@ -255,5 +255,6 @@ class Selector:
 
 def predict(effect: AbstractEffect, amplitude: np.ndarray) -> tuple[AbstractEffect, bool]:
     """An effect with predicted amplitudes, and whether physics admits them."""
-    values = dict(zip(amplitudes(effect), amplitude.tolist(), strict=False))
+    names = amplitudes(effect)
+    values = dict(zip(names, amplitude.tolist(), strict=True)) if names else {}
     return with_numbers(effect, values) if values else effect, bool(_Admitted([effect])([amplitude])[0])
