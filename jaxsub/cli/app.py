@@ -1,4 +1,4 @@
-"""Commands of `jaxsub` (formats.md)."""
+"""The commands of `jaxsub`."""
 
 from collections.abc import Callable
 from pathlib import Path

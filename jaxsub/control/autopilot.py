@@ -19,8 +19,13 @@ REFERENCES = ("course_rate", "depth", "roll")
 
 
 class AutopilotMemory(eqx.Module):
-    """What an autopilot remembers: the deflections (rad) it ended with, the integral of each loop, the depth (m) it was
-    shown, and whether it has yet been shown anything."""
+    """What an autopilot remembers.
+
+    **Fields**
+
+    - `deflections`: rad, that it ended with. `held`: the integral of each loop, SI.
+    - `depth`: m, that it was shown. `fresh`: whether it has not yet been shown anything.
+    """
 
     deflections: dict[str, Float[Array, ""]]
     held: dict[str, Float[Array, ""]]

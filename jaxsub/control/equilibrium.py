@@ -29,7 +29,7 @@ class Trim(eqx.Module):
 
     **Fields**
 
-    - `x`: (s,) the plant's state; `u`: (m,) its inputs.
+    - `x`: (s,) the plant's state, SI; `u`: (m,) its inputs, SI.
     - `residual`: the largest rate or deviation that is left, SI.
     - `result`: what became of the search. A failure is a value, also under vmap; `require_trim` makes it an error.
     """

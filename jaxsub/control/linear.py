@@ -17,9 +17,10 @@ class LinearPlant(eqx.Module):
 
     **Fields**
 
-    - `A`, `B`, `C`, `D`: of deviations from the point. `x`, `u`, `y`: the point, and the outputs there.
-    - `drift`: what the state does there, by which the model is affine: its change in a sample, or its rate. A trim has
-      drift in place and heading alone.
+    - `A`: (s, s) SI, `B`: (s, m) SI, `C`: (c, s) SI and `D`: (c, m) SI: of deviations from the point.
+    - `x`: (s,) SI and `u`: (m,) SI, the point; `y`: (c,) the outputs there, SI.
+    - `drift`: (s,) what the state does there, by which the model is affine: its change in a sample, or its rate, SI. A
+      trim has drift in place and heading alone.
     - `dt`: s between samples; zero for rates in continuous time.
     - `states`, `inputs`, `outputs`: names.
     """

@@ -27,7 +27,7 @@ class MpcPlan(eqx.Module):
 
     **Fields**
 
-    - `nodes`: (d,) the inputs it planned, in their amplitudes. `last`: (m,) the inputs that it gave, SI.
+    - `nodes`: (d,) the inputs it planned, in units of their amplitudes. `last`: (m,) the inputs that it gave, SI.
     """
 
     nodes: Float[Array, " d"]
@@ -39,9 +39,9 @@ class Solved(eqx.Module):
 
     **Fields**
 
-    - `cost`: J of the plan. `promised`: what another step would gain, in parts of 1 + J.
-    - `passed`: the most by which it passes a limit of inputs and of channels, in parts of the limit; zero where it does
-      not. `steps`: how many it took.
+    - `cost`: J of the plan, without a unit. `promised`: what another step would gain, in parts of 1 + J.
+    - `passed`: (2,) the most by which it passes a limit of inputs and of channels, in parts of the limit; zero where it
+      does not. `steps`: how many it took.
     - `finite`: whether the prediction is; if not, the inputs stay what they were.
     """
 

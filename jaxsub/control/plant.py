@@ -44,7 +44,7 @@ class Plant(eqx.Module):
     **Fields**
 
     - `sampled`: the vehicle made ready to step. `dt`: s between samples.
-    - `constants`: (columns,) the signals that do not come from u. `driven`: the columns that do.
+    - `constants`: (columns,) the signals that do not come from u, SI. `driven`: the columns that do.
     - `sizes`: how many numbers each effect remembers.
     """
 

@@ -26,8 +26,9 @@ class Pursuit:
 
     **Fields**
 
-    - `recording`: inputs as given and measured channels. `truth`: (K,) each of the tracked and bounded channels, true.
-    - `wanted`: (K, t) references. `inputs`: (K, m).
+    - `recording`: inputs as given and measured channels.
+    - `truth`: (K,) each of the tracked and bounded channels, true, SI.
+    - `wanted`: (K, t) references, SI. `inputs`: (K, m) as given, SI.
     - `seconds`, `work`: (K,) wall-clock and processor time of each sample's estimate and plan, s, without compiling.
     - `solved`: of each sample, stacked.
     """

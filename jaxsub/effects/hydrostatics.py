@@ -15,7 +15,7 @@ REFERENCE_TEMPERATURE = 288.15
 
 
 def lift(motion: Motion, newton: Signal) -> dict[str, Signal]:
-    """Body-axis force of `newton` of extra buoyancy: up, turned by the attitude (equations.md §1 with B + ΔB)."""
+    """Body-axis force of `newton` of extra buoyancy: up, turned by the attitude. Source: Fossen (2021), §4.1."""
     phi, theta = motion.positions["phi"], motion.positions["theta"]
     xp = namespace(phi, theta)
     return {
@@ -63,7 +63,7 @@ class TrimOffset(AbstractForce):
     r"""A centre of buoyancy that is not where the vehicle file puts it: $\Delta x_B, \Delta y_B$ or $\Delta z_B$.
 
     $K = B(-\Delta y_B\cos\phi\cos\theta + \Delta z_B\sin\phi\cos\theta)$, $M = B(\Delta x_B\cos\phi\cos\theta +
-    \Delta z_B\sin\theta)$, $N = -B(\Delta x_B\sin\phi\cos\theta + \Delta y_B\sin\theta)$. Source: equations.md §1.
+    \Delta z_B\sin\theta)$, $N = -B(\Delta x_B\sin\phi\cos\theta + \Delta y_B\sin\theta)$. Source: Fossen (2021), §4.1.
     """
 
     name: ClassVar[str] = "trim-offset"

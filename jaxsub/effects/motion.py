@@ -72,13 +72,13 @@ class Motion(eqx.Module):
 
     - `rates`: velocity of each equation of motion (m/s or rad/s): all six of a submerged body, also the locked ones.
     - `positions`: `phi theta psi x y z`, or a mechanism's coordinates (m or rad).
-    - `actuators`: deflections and speeds by actuator name (rad, rad/s, N).
-    - `environment`: recorded surroundings, such as `density` (kg/m³).
-    - `inertia`: (n, n) mass matrix of the equations in `rates`.
+    - `actuators`: deflections (rad), speeds (rad/s) and thrusts (N) by actuator name.
+    - `environment`: recorded surroundings, SI, such as `density` (kg/m³).
+    - `inertia`: (n, n) mass matrix of the equations in `rates`, SI.
     - `buoyancy`: displaced weight (N); zero for a mechanism.
     - `cruise`: the operating speed U_c (m/s) about which linear coefficients were taken.
     - `time`: s from the run's own start.
-    - `accelerations`: rates of the free equations' velocities, where an accelerometer needs them.
+    - `accelerations`: rates of the free equations' velocities (m/s² or rad/s²), where an accelerometer needs them.
     - `water`: velocity of the water over ground in body axes (m/s), by the equation of the body's own; absent at rest.
     - `actuation`: the forces of the model's own actuators, each by itself.
     - `first_order`: whether `rates` are the states themselves, as of a user's own model.

@@ -47,7 +47,7 @@ class AbstractSearchEnd(eqx.Module):
 
     **Fields**
 
-    - `vehicle`: with the numbers found. `start`: (R, s) initial states. `sigma`: (c,) noise, SI.
+    - `vehicle`: with the numbers found. `start`: (R, s) initial states, SI. `sigma`: (c,) noise, SI.
     - `cost`: ½ Σ whitened residuals², priors included. `steps`: evaluations by the search. `result`: a `RESULTS` value.
     - `known_start`: whether `start` was given. `estimated_spreads`: the numbers that differ by run whose standard
       deviation between runs was estimated.
@@ -108,11 +108,11 @@ class Solution(AbstractSearchEnd):
 
     **Fields** beside those of `AbstractSearchEnd`
 
-    - `covariance`: of the p free parameters, physical units; the initial states' uncertainty is included.
+    - `covariance`: (p, p) of the free parameters, SI; the initial states' uncertainty is included.
     - `model`: the vehicle linearised along the fitted trajectory, block by block.
     - `gradient_norm`: largest |∂cost/∂y| in scaled coordinates, relative to the largest curvature's square root: how
       many standard errors the optimum within bounds may still be away.
-    - `pressed`: (p,) -1 for a parameter that presses on its lower bound, 1 on its upper one, 0 for any other.
+    - `pressed`: (p,) without a unit: -1 for a parameter that presses on its lower bound, 1 on its upper one, else 0.
     """
 
     vehicle: AbstractVehicle

@@ -60,8 +60,8 @@ class Found(eqx.Module):
 
     **Fields**
 
-    - `y`: (N, d) coordinates. `cost`: (N,) ½ Σ residuals² there.
-    - `evaluations`: (N,) of the cost, with whichever derivatives the method takes along.
+    - `y`: (N, d) coordinates. `cost`: (N,) ½ Σ whitened residuals² there.
+    - `evaluations`: (N,) how many of the cost, with whichever derivatives the method takes along.
     - `result`: a `RESULTS` value each.
     """
 

@@ -36,9 +36,10 @@ class Problem(eqx.Module):
 
     - `vehicle`: its free numbers are where the search starts. `runs`: the recordings.
     - `sigma`: (c,) noise of each channel, SI.
-    - `transform`: of the free parameters; `origin`: (p,) the coordinates where they start, and stay where `moving` is
-      false. `prior_mean`, `prior_std`: (p,), the latter infinite where there is none.
-    - `guess`, `start_std`: (R, s) and (s,) Gaussian prior of the initial states; of a known one it is zero.
+    - `transform`: of the free parameters; `origin`: (p,) the coordinates where they start.
+    - `moving`: (p,) false for a coordinate that stays where it starts.
+    - `prior_mean`, `prior_std`: (p,) of the parameters, SI; the latter infinite where there is none.
+    - `guess`: (R, s) and `start_std`: (s,) Gaussian prior of the initial states, SI; of a known one it is zero.
     - `known_start`: whether initial states are known, and no coordinates.
     - `march`: where there is one, cost and expansion come from compiled C, and have no further derivatives.
     """
@@ -232,7 +233,13 @@ def require_free(vehicle: AbstractVehicle, where: str) -> None:
 
 
 class Expansion(eqx.Module):
-    """A cost to second order about a point: its value, gradient (d,) and curvature (d, d), or the parts of that."""
+    """A cost to second order about a point, in the coordinates of a problem.
+
+    **Fields**
+
+    - `cost`: ½ Σ whitened residuals². `gradient`: (d,) by the coordinates.
+    - `curvature`: (d, d) by the coordinates, or the parts of that.
+    """
 
     cost: Float[Array, ""]
     gradient: Float[Array, " d"]

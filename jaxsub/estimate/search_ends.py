@@ -18,7 +18,7 @@ class Ends(eqx.Module):
 
     **Fields**
 
-    - `theta`, `standard_errors`: (N, p) of the free parameters, the initial states' uncertainty included.
+    - `theta`, `standard_errors`: (N, p) the free parameters, SI, the initial states' uncertainty included.
     - `away`: (N,) how many standard errors the optimum may still be away. `result`: as `Solution` has it.
     """
 

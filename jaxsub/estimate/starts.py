@@ -82,7 +82,13 @@ def success(found: Found, best: float, margin: float = MARGIN) -> Rate:
 
 @dataclasses.dataclass(frozen=True)
 class Basin:
-    """Ends of searches that lie together: the least cost among them, how many there are, and the best's coordinates."""
+    """Ends of searches that lie together.
+
+    **Fields**
+
+    - `cost`: the least among them, ½ Σ whitened residuals². `count`: how many there are.
+    - `y`: (d,) coordinates of the best.
+    """
 
     cost: float
     count: int

@@ -27,11 +27,12 @@ class FilterState(eqx.Module):
 
     **Fields**
 
-    - `x`: (n,) state, of s ways to change. `theta`: (p,) parameters.
-    - `joint`: what the filter's form keeps of the uncertainty of [x, θ]; `own`: of x were θ known, where it has that.
+    - `x`: (n,) state, SI, of s ways to change. `theta`: (p,) parameters, in their coordinates.
+    - `joint`: (q, q) covariance of [x, θ], q = s + p, or its root, as the filter's form keeps it.
+    - `own`: (s, s) the same of x, SI, were θ known; None where the filter has no such.
     - `memory`, `residuals`: of the process-noise rule.
-    - `outside`: (c,) how often each channel was outside the gate in a row, in agreement; `rejected`: (c,) innovation of
-      the last that was.
+    - `outside`: (c,) how often each channel was outside the gate in a row, in agreement; `rejected`: (c,) innovation
+      of the last that was, SI.
     - `diverged`: whether a number ceased to be finite. The filter then stays at its last finite numbers.
     """
 
@@ -51,8 +52,9 @@ class Estimate(eqx.Module):
 
     **Fields**
 
-    - `x`, `theta`: estimates; `x_std`, `theta_std`: their standard deviations, the state's s of its changes.
-    - `innovation`: (c,) measured minus predicted, zero where missing or rejected; `factor`: (c, c) lower-triangular
+    - `x`: (n,) estimated state, SI; `x_std`: (s,) standard deviations of its changes, SI.
+    - `theta`, `theta_std`: (p,) estimated parameters, in their coordinates, and their standard deviations.
+    - `innovation`: (c,) measured minus predicted, SI, zero where missing or rejected; `factor`: (c, c) lower-triangular
       factor of its covariance, parameters' uncertainty included: the whitened innovation is factor⁻¹ innovation.
     - `used`: (c,) true where measured and believed. `noise_std`: (s,) root of the process noise's variance in the
       interval before.

@@ -1,4 +1,4 @@
-r"""Process noise from fuzzy regression on the state's residuals (equations.md §5, the second paper's section 4).
+r"""Process noise from fuzzy regression on the state's residuals (the second paper's section 4).
 
 $\Delta x$ is what a measurement corrects the state by; over a moving window it is fitted by Tanaka's line
 $\Delta x(t) = A_0 + A_1 t$ with fuzzy $A_i$, whose slope is $\Delta\dot x$. Then

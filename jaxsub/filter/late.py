@@ -19,7 +19,8 @@ class Late(eqx.Module):
 
     **Fields**
 
-    - `outputs`, `mask`, `scale`: as in `Sample`, (c,). `age`: s before the newest sample.
+    - `outputs`: (c,) SI, `mask`: (c,) and `scale`: (c,) without a unit, as in `Sample`.
+    - `age`: s before the newest sample.
     """
 
     outputs: Float[Array, "*k c"]

@@ -1,4 +1,4 @@
-r"""The modified extended Kalman filter: two filters in parallel (equations.md §4, the paper's section 5).
+r"""The modified extended Kalman filter: two filters in parallel (the first paper's section 5).
 
 I is the optimal Kalman filter of the state with $\hat\theta_{k-1}$ taken as known. II is the extended Kalman filter of
 $[x, \theta]$, linearised about ($\hat x$ of I, $\hat\theta_{k-1}$); it returns $\hat\theta_k$ to I, and what it makes

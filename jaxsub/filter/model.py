@@ -14,10 +14,10 @@ class Sample(eqx.Module):
 
     **Fields**
 
-    - `inputs`: whatever the process takes.
+    - `inputs`: whatever the process takes, SI.
     - `elapsed`: s since the sample before; zero at the first of a run and where padded: there no time passes.
-    - `outputs`: (c,) measured channels; `mask`: (c,) true where measured.
-    - `scale`: (c,) noise of the channels in terms of what the filter assumes; by default one.
+    - `outputs`: (c,) measured channels, SI; `mask`: (c,) true where measured.
+    - `scale`: (c,) noise of the channels relative to what the filter assumes; by default one.
     """
 
     inputs: PyTree[Array]

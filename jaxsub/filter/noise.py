@@ -17,9 +17,9 @@ class Innovation(eqx.Module):
 
     **Fields**
 
-    - `value`: (c,) zero where missing or rejected; `mask`: (c,) true elsewhere.
-    - `C`: (c, q) Jacobian of the outputs by [x, θ]. `R_root`: (c, c) factor of the sensors' covariance.
-    - `covariance`: (c, c) of the innovation, as if nothing was missing.
+    - `value`: (c,) measured less expected, SI, zero where missing or rejected; `mask`: (c,) true elsewhere.
+    - `C`: (c, q) Jacobian of the outputs by [x, θ]. `R_root`: (c, c) factor of the sensors' covariance, SI.
+    - `covariance`: (c, c) of the innovation, SI, as if nothing was missing.
     """
 
     value: Float[Array, " c"]
@@ -34,9 +34,9 @@ class Residuals(eqx.Module):
 
     **Fields**
 
-    - `innovation`: (c,) zero where missing or rejected; `mask`: (c,) true where used.
+    - `innovation`: (c,) SI, zero where missing or rejected; `mask`: (c,) true where used.
     - `factor`: (c, c) lower-triangular factor of the innovation's covariance.
-    - `gain`: (s, c) of the state; `correction`: (s,) gain times innovation.
+    - `gain`: (s, c) state by channel, SI; `correction`: (s,) of the state, SI: gain times innovation.
     """
 
     innovation: Float[Array, " c"]

@@ -32,8 +32,9 @@ class Identified(eqx.Module):
 
     **Fields**
 
-    - `theta`: (p,) after the last pass; `covariance`: (p, p) of that pass alone.
-    - `trace`: (passes, p) after each pass.
+    - `theta`: (p,) parameters after the last pass, in their coordinates.
+    - `covariance`: (p, p) of the coordinates, of that pass alone.
+    - `trace`: (passes, p) the coordinates after each pass.
     - `diverged`: whether the last pass did; then `theta` is where it broke down.
     """
 

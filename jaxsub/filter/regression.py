@@ -1,4 +1,4 @@
-r"""Linear fuzzy regression over a window, solved exactly (equations.md §5; the second paper, eqs. 19 to 22).
+r"""Linear fuzzy regression over a window, solved exactly (the second paper's eqs. 19 to 22).
 
 $\Delta x(t) = A_0 + A_1 t$ with symmetric triangular $A_i$ of centre $p_i$ and spread $c_i$, and t from the window's
 first sample, where eq. 20 without a modulus holds:

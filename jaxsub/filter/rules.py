@@ -85,7 +85,8 @@ class SageHusaNoise(AbstractNoiseRule):
 
     **Fields**
 
-    - `first`: (s,) root of the density to begin with; `least`, `most`: (s,) its limits. State units per root second.
+    - `first`: (s,) root of the density to begin with, state units per root second.
+    - `least`, `most`: (s,) its limits, in the same units.
     - `forgetting`: b, the weight of all that was learnt before.
 
     Source: Sage and Husa (1969), Joint Automatic Control Conference.

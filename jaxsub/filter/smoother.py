@@ -24,7 +24,7 @@ class Smoothed(eqx.Module):
 
     **Fields**
 
-    - `x`: (n,) state. `covariance`: (s, s) of its changes.
+    - `x`: (n,) state, SI. `covariance`: (s, s) of its changes, SI.
     """
 
     x: Float[Array, "*k n"]

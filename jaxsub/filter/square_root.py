@@ -1,4 +1,4 @@
-r"""Kalman algebra on square roots $P = JJ^T$, and on covariances for comparison (equations.md §4).
+r"""Kalman algebra on square roots $P = JJ^T$, and on covariances for comparison (the first paper's section 5).
 
 A square root has as many rows as the state; any such J serves, and `by_qr` gives the lower-triangular one. The paper
 takes $L = (CJJ^TC^T + R)^c$; here L is the triangular factor of $[CJ, R^c]$, the same matrix without the square whose

@@ -20,8 +20,8 @@ class Drive(eqx.Module):
 
     **Fields**
 
-    - `nodes`: (3, m + 1) signals and time at the start, middle and end of the interval before it.
-    - `time`: s from the start of the run. `signals`: (m,) at the sample.
+    - `nodes`: (3, m + 1) signals, SI, and time, s, at the start, middle and end of the interval before it.
+    - `time`: s from the start of the run. `signals`: (m,) at the sample, SI.
     """
 
     nodes: Float[Array, "*k 3 m1"]

@@ -30,7 +30,8 @@ class Information:
     **Fields**
 
     - `names`: of the p free coefficients. `matrix`: (p, p) Fisher information of their relative changes.
-    - `prior`: (p,) information held beforehand. `seconds`, `energy`: of the manoeuvre, as in `ManoeuvreLimits`.
+    - `prior`: (p,) information on relative changes that is held beforehand.
+    - `seconds`, `energy`: of the manoeuvre, as in `ManoeuvreLimits`.
     - `peaks`: the largest size of each channel that the vehicle can produce, SI.
     """
 

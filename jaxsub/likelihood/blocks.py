@@ -44,7 +44,7 @@ class BlockLinearised(eqx.Module):
 
     **Fields**
 
-    - `vehicle`, `runs`: the model and the runs. `sigma`: (c,) noise, `start_std`: (s,) of the initial states, both SI.
+    - `vehicle`, `runs`: the model and the runs. `sigma`: (c,) noise, SI. `start_std`: (s,) of the initial states, SI.
     - `products`: (R, q, q) of each run's whitened columns: by the p free parameters, by its initial state in its
       `start_std`, and the error.
     - `error`: (R, K, c) measured minus modelled, SI, zero where missing.

@@ -50,9 +50,10 @@ class System(eqx.Module):
 
     **Fields**
 
-    - `A`: (R, K-1, s, s) of the step by the state. `G`: (R, K-1, s, 2n) by a force at its start and end.
-    - `C`: (R, K, c, s) of the channels by the state, zero where nothing was measured; `measured`: (R, K, c).
-    - `intervals`: (R, K-1) s, 0 where padded. `start_std`: (s,) prior standard deviation of the initial states.
+    - `A`: (R, K-1, s, s) of the step by the state, SI. `G`: (R, K-1, s, 2n) by a force at its start and end, SI.
+    - `C`: (R, K, c, s) of the channels by the state, noise units per SI unit, zero where nothing was measured.
+    - `measured`: (R, K, c) whether it was.
+    - `intervals`: (R, K-1) s, 0 where padded. `start_std`: (s,) prior standard deviation of the initial states, SI.
     """
 
     A: Float[Array, "r k1 s s"]
@@ -83,7 +84,7 @@ class Columns(eqx.Module):
     A column is what it shows plus what the system makes of its forcing.
 
     - `shown`: (R, K, c, q) in the channels, in units of their noise, zero where nothing was measured.
-    - `forcing`: (R, K-1, s, q) on the state in each step; None where `shown` holds that already.
+    - `forcing`: (R, K-1, s, q) on the state in each step, SI; None where `shown` holds that already.
     """
 
     shown: Float[Values, "r k c q"]

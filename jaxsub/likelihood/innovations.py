@@ -7,7 +7,7 @@ at one to which missing forces drove a free-running model. The forces at a filte
 sensors are looked at through the state that was expected: regressors that know nothing of the noise that they are held
 against, so that innovations and columns are independent where the model is right.
 
-Source: Åström (1980), Automatica 16, prediction errors; design.md.
+Source: Åström (1980), Automatica 16, prediction errors.
 """
 
 import equinox as eqx
@@ -31,7 +31,7 @@ class FilteredRuns(eqx.Module):
 
     **Fields**
 
-    - `expected`: (R, K, s) states before, `filtered`: (R, K, s) after each sample was seen.
+    - `expected`: (R, K, s) states before each sample was seen, SI; `filtered`: (R, K, s) after it, SI.
     - `force`: (R, K, n) the disturbance force (N, N m) after each sample.
     - `system`: linearised, steps at the filtered and outputs at the expected states.
     - `residual`: one column, the measured outputs less those expected, and the filter's corrections of the path.

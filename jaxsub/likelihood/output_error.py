@@ -1,4 +1,4 @@
-r"""Output-error likelihood: measured outputs against the free-running model (equations.md §3).
+r"""Output-error likelihood: measured outputs against those of an open-loop simulation.
 
 $-\ln p(Z\mid\theta, x_0) = \tfrac12\sum_{r,k,c} m_{rkc}\,(z_{rkc} - \hat y_{rkc}(\theta, x_{0r}))^2/\sigma_c^2
 + \sum_c N_c\ln\sigma_c$, with m the mask, one free initial state a run, and $\sigma$ given or concentrated out.

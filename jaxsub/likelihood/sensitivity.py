@@ -29,10 +29,11 @@ class Linearised(eqx.Module):
 
     **Fields**
 
-    - `states`: (R, K, s). `error`: (R, K, c) measured minus modelled, SI, zero where missing.
-    - `A`: (R, K-1, s, s) of the step by the state. `G`: (R, K-1, s, 2n) by a force at its start and end.
-    - `C`: (R, K, c, s) of the outputs by the state.
-    - `theta`: (R, K, c, p) of the outputs by the free parameters; `start`: (R, K, c, s) by the run's initial state.
+    - `states`: (R, K, s) SI. `error`: (R, K, c) measured minus modelled, SI, zero where missing.
+    - `A`: (R, K-1, s, s) of the step by the state, SI. `G`: (R, K-1, s, 2n) by a force at its start and end, SI.
+    - `C`: (R, K, c, s) of the outputs by the state, SI.
+    - `theta`: (R, K, c, p) of the outputs by the free parameters, in their coordinates; `start`: (R, K, c, s) by the
+      run's initial state, SI.
     """
 
     states: Float[Array, "r k s"]
@@ -64,8 +65,9 @@ class Jacobians(eqx.Module):
 
     **Fields**
 
-    - `A`, `G`, `C`: as of `Linearised`. `F`: (R, K-1, s, p) of the step by the free parameters.
-    - `direct`: (R, K, c, p) of the outputs by the free parameters, the state held.
+    - `A`: (R, K-1, s, s) SI, `G`: (R, K-1, s, 2n) SI and `C`: (R, K, c, s) SI, as of `Linearised`.
+    - `F`: (R, K-1, s, p) of the step by the free parameters, in their coordinates.
+    - `direct`: (R, K, c, p) of the outputs by the free parameters, in their coordinates, the state held.
     - `shown`: (R, K, c) the outputs themselves, SI.
     """
 

@@ -24,7 +24,8 @@ class AlarmTest(eqx.Module):
 
     **Fields**
 
-    - `threshold`: of the largest z² of any change in any window. `variance`: (M, n + c) of z without a change.
+    - `threshold`: of the largest z² of any change in any window, without a unit. `variance`: (M, n + c) of z without a
+      change, without a unit.
     - `quiet`: s below the threshold after which an alarm has ended.
     """
 
@@ -39,7 +40,7 @@ class MonitorState(eqx.Module):
     **Fields**
 
     - `stream`: of its filter, and what was wrong with rows. `begun`: s, of the clock, when the run began.
-    - `signatures`, `score`: of changes, and (M, n + c) their products with the innovations.
+    - `signatures`: of changes; `score`: (M, n + c) their products with the innovations, whitened.
     - `alarm`: whether one stands; `above`: s, when the statistic was above the threshold last.
     """
 
@@ -57,9 +58,11 @@ class Observation(eqx.Module):
     **Fields**
 
     - `taken`: whether the row was used; where not, all else is of the row before.
-    - `statistic`: the largest z² of any change in any window, over its variance; `change`: which of the n + c; `age`:
-      samples since the window began; `size`: the change's estimated size, N, N m or the channel's sigma; `size_std`:
-      its standard deviation. `likely`: (n + c,) changes that explain nearly as much, it among them.
+    - `statistic`: the largest z² of any change in any window, over its variance, without a unit.
+    - `change`: index among the n + c; `age`: samples since the window began.
+    - `size`: the change's estimated size, N, N m or the channel's sigma; `size_std`: its standard deviation, in the
+      same unit.
+    - `likely`: (n + c,) changes that explain nearly as much, it among them.
     - `raised`, `ended`: whether an alarm begins or ends. `recovered`: (c,) channels that are believed again although
       they jumped.
     - `estimate`: of the filter.

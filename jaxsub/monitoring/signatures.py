@@ -51,7 +51,8 @@ class Signatures(eqx.Module):
     **Fields**
 
     - `D`: (M, z, n + c) deviations of the state for a change of unit size: N or N m, and the channel's sigma.
-    - `age`: (M,) samples since each window began. `information`: (M, n + c) sums of squares of the signatures.
+    - `age`: (M,) samples since each window began. `information`: (M, n + c) sums of squares of the whitened
+      signatures.
     """
 
     D: Float[Array, "m z q"]

@@ -25,7 +25,8 @@ class MagneticField(eqx.Module):
 
     **Fields**
 
-    - `horizontal`, `down`: its parts. `spread`: standard deviation of each component from place to place.
+    - `horizontal`, `down`: its parts, in that unit. `spread`: standard deviation of each component from place
+      to place, in that unit.
     """
 
     horizontal: Float[Array, ""] | float

@@ -1,4 +1,4 @@
-r"""The second paper's attitude filter as a process (equations.md §5, eqs. 3 to 10 and 17).
+r"""The second paper's attitude filter as a process (its eqs. 3 to 10 and 17).
 
 State $[q, b]$: the body's quaternion and the gyros' bias, rad/s. Channels: roll, pitch and yaw, rad, such as
 `constructed` makes of GPS and accelerometers.

@@ -153,8 +153,9 @@ class ConstructedAttitudeStream(eqx.Module):
 
     **Fields**
 
-    - `time`, `accelerometer`: of the last sample; `sound`: whether its reading was finite. `started`: whether any came.
-    - `fixes`: (2, 3) and `times`: (2,) of the last two fixes, of which `count` are there.
+    - `time`: s, of the last sample, and `accelerometer`: (3,) m/s², its reading; `sound`: whether that was finite.
+    - `started`: whether any sample came.
+    - `fixes`: (2, 3) m and `times`: (2,) s of the last two fixes; `count`: how many of them are there.
     - `integral`: (2, 3) m/s of the accelerometer's readings between those fixes and since the last; `covered`: (2,) s
       of these intervals in which it was heard.
     - `limits`: where a construction gives up.

@@ -20,7 +20,7 @@ class FlightReading(eqx.Module):
     **Fields**
 
     - `time`: s. `gyro`: (3,) rad/s and `accelerometer`: (3,) m/s², body axes. `speed`: m/s along the body's x axis.
-    - `fix`: (3,) m, north, east, down, of which there is one where `present`.
+    - `fix`: (3,) m, north, east, down; `present`: whether there is one.
     """
 
     time: Float[Array, " *k"]

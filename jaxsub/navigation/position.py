@@ -1,4 +1,4 @@
-r"""The second paper's position filter as a process (equations.md §5, eqs. 11 to 16).
+r"""The second paper's position filter as a process (its eqs. 11 to 16).
 
 State: north, east, down, m. It goes where the body's x axis points, at the speed that a log or a pitot tube measures.
 """
@@ -17,7 +17,7 @@ class Course(eqx.Module):
 
     **Fields**
 
-    - `speed`: m/s along the body's x axis. `attitude`: (4,) quaternion of the body.
+    - `speed`: m/s along the body's x axis. `attitude`: (4,) quaternion of the body, of unit length.
     - `attitude_std`: (3,) rad, standard deviations of its rotation about the body's axes.
     """
 

@@ -25,9 +25,9 @@ class Reading(eqx.Module):
     **Fields**
 
     - `time`: s, of one clock. In 32 bits it is rounded to 0.12 ms after half an hour, to 8 ms after a day.
-    - `inputs`: what drove the process since the reading before.
-    - `outputs`: (c,) measured channels; `mask`: (c,) true where measured.
-    - `scale`: (c,) noise of the channels in terms of what the filter assumes; by default one.
+    - `inputs`: what drove the process since the reading before, SI.
+    - `outputs`: (c,) measured channels, SI; `mask`: (c,) true where measured.
+    - `scale`: (c,) noise of the channels relative to what the filter assumes; by default one.
     """
 
     time: Float[Array, " *k"]
@@ -132,7 +132,7 @@ class StreamState(eqx.Module):
 
     **Fields**
 
-    - `filter`: its filter's state. `clock`: the last time. `inputs`: the last good ones.
+    - `filter`: its filter's state. `clock`: the last time. `inputs`: the last good ones, SI.
     - `taken`: (c,) channels measured at the last time. `faults`: counted since the start.
     """
 

@@ -19,11 +19,15 @@ _GAP = 1.5  # usual intervals that a gap is longer than
 class Recording:
     """One run: float64 SI samples on strictly increasing times, NaN for a missing sample.
 
-    `times` is (samples,) in s and `columns` maps a name to (samples,). `source` is the file or process that made the
-    run and `first_row` the row of its first sample there; errors quote both. The arrays are read-only copies.
-    `units` has the SI unit of each column whose file states one; `unusable` the error of each column that holds no
-    numbers or has a unit that is none, raised when the column is used; `findings` what reading and checking found.
-    Raises InputError for fewer than two samples, a time that is not finite or not later than the one before, an
+    **Fields**
+
+    - `times`: (samples,) s. `columns`: (samples,) SI, by name. The arrays are read-only copies.
+    - `source`: the file or process that made the run; `first_row`: that of its first sample there.
+    - `units`: the SI unit of each column whose file states one.
+    - `unusable`: the error of each column that holds no numbers or has a unit that is none, raised when it is used.
+    - `findings`: what reading and checking found.
+
+    **Raises** `InputError` for fewer than two samples, a time that is not finite or not later than the one before, an
     infinite sample, columns of unequal length, or a name that a file header could not hold.
     """
 

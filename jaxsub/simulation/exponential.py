@@ -1,4 +1,4 @@
-r"""The sampled step: exact for the linear part (equations.md, eq. 2), of order four for the rest.
+r"""The sampled step: exact for the linear part (the first paper's eq. 2), of order four for the rest.
 
 With $\dot x = Lx + N(x, t)$ and L acting on the velocities, the scheme is Cox and Matthews' ETDRK4 (2002,
 J. Comput. Phys. 176): for constant N it is eq. 2 whatever the step, for L = 0 the classical Runge–Kutta scheme.

@@ -18,7 +18,7 @@ class Sampled(eqx.Module):
     **Fields**
 
     - `vehicle`: the model.
-    - `inverse`: (n, n) inverse of the inertia matrix.
+    - `inverse`: (n, n) inverse of the inertia matrix, SI.
     - `table`: weights of the distinct steps of some runs.
     - `substeps`: steps in each sample interval.
     - `rest`: (n, n) what the linear part has beyond that of `table`, 1/s; it acts as a force does.

@@ -19,9 +19,9 @@ class Trajectory(eqx.Module):
     **Fields**
 
     - `start`, `end`: at both ends of every interval, (R, K-1): filtered, and what was expected from there.
-    - `seen`: at every sample, (R, K), as expected; `true`: (R, K) measured channels there, before any sensor effect.
-    - `nodes`: (R, K-1, 3, m) signals after the actuators, time last. `times`: (R, K) s; `steps`: (R, K-1) s, 0 where
-      padded.
+    - `seen`: at every sample, (R, K), as expected; `true`: (R, K) measured channels there, SI, without sensor effects.
+    - `nodes`: (R, K-1, 3, m) signals after the actuators, SI, time last.
+    - `times`: (R, K) s; `steps`: (R, K-1) s, 0 where padded.
     """
 
     start: Motion

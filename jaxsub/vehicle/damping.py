@@ -10,7 +10,7 @@ from .inertia import CENTRE_OF_GRAVITY, place, sparse
 
 
 class Damping(eqx.Module):
-    r"""$\tilde A$ (equations.md §1): the linear derivatives `X_u` … `N_r` and the terms of going around.
+    r"""$\tilde A$ (the first paper's eq. 1): the linear derivatives `X_u` … `N_r` and the terms of going around.
 
     Those are the centripetal $-mU_c r$ in sway and $+mU_c q$ in heave. Where the origin is not the centre of gravity,
     $mU_c(z_G r + y_G q)$ in roll, $-mU_c x_G q$ in pitch and $-mU_c x_G r$ in yaw come with them.

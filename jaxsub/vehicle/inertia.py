@@ -15,7 +15,7 @@ CENTRE_OF_GRAVITY = ("x_G", "y_G", "z_G")
 
 
 class Inertia(eqx.Module):
-    r"""$\tilde M = M_{RB} - \{X_{\dot u}, …, N_{\dot r}\}$ about the body's origin (equations.md §1).
+    r"""$\tilde M = M_{RB} - \{X_{\dot u}, …, N_{\dot r}\}$ about the body's origin (the first paper's eq. 1).
 
     The origin is the centre of gravity where that is not given. Else $M_{RB}$ has $\mp m S(r_G)$ beside its diagonal.
 

@@ -11,7 +11,7 @@ from .attitude import EULER, QUATERNION, down, quaternion_rates, sine_cosine, tu
 
 
 def position_rates(motion: Motion) -> dict[str, Signal]:
-    r"""Euler rates and velocity over ground (equations.md §1).
+    r"""Euler rates and velocity over ground. Source: Fossen (2021), §2.2.
 
     $\dot\psi = (q\sin\phi + r\cos\phi)/\cos\theta$, $\dot\theta = q\cos\phi - r\sin\phi$,
     $\dot\phi = p + \dot\psi\sin\theta$, and $[\dot x\,\dot y\,\dot z] = R(\phi,\theta,\psi)[u\,v\,w]$ with z down.

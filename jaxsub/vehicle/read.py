@@ -1,4 +1,4 @@
-"""Vehicle files in: TOML to a vehicle (formats.md)."""
+"""Vehicle files in: TOML to a vehicle."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ _MOST_EFFECTS = 100
 def read_vehicle(path: str | Path, effects: Sequence[type[AbstractEffect]] = ()) -> Vehicle:
     """The vehicle in the file at `path`, which may have `effects` of a user's own besides those of the vocabulary.
 
-    **Raises** `InputError` that names the file and the key for anything that is not as formats.md has it.
+    **Raises** `InputError` that names the file and the key for anything that a vehicle file may not hold.
     """
     return vehicle_from(read_toml(Path(path)), str(path), effects, Path(path).parent)
 

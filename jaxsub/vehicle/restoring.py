@@ -10,7 +10,7 @@ from .inertia import CENTRE_OF_GRAVITY
 
 
 class Restoring(eqx.Module):
-    r"""$\tilde S(\eta)$ of a body (equations.md §1), with its origin at the centre of gravity where that is not given.
+    r"""$\tilde S(\eta)$ of a body (the first paper's eq. 1); its origin is the centre of gravity where none is given.
 
     **Fields**
 

@@ -36,7 +36,7 @@ class SubmergedBody(AbstractVehicle):
     r"""$\tilde M\dot\nu = \tilde A\nu + \tau(\nu, \delta) - C(\nu)\nu + \tilde S(\eta)$, effects on top.
 
     $\tilde A$ is linear damping, $\tau$ the sum of all other derivatives, and $C$ the inertia's, as `coriolis` says.
-    Where that is linear, $\tilde A$ has the turning of the operating speed in its place (equations.md §1).
+    Where that is linear, $\tilde A$ has the turning of the operating speed in its place (the first paper's eq. 1).
     In water that flows with $v_c$, steady and without curl, the body moves as it would in water at rest at the velocity
     $\nu_r = \nu - [v_c\,0]$: $\tilde M\dot\nu_r$ equals the same forces, and $\dot v_c = v_c\times\nu_2$ in body axes.
     Source: Fossen (2021), §6.8 and §10.3.

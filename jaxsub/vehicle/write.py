@@ -1,4 +1,4 @@
-"""Vehicle files out: a vehicle to TOML (formats.md)."""
+"""Vehicle files out: a vehicle to TOML."""
 
 import dataclasses
 import math

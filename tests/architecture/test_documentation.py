@@ -1,6 +1,7 @@
 """Public docstrings name every argument, rooms export and define nothing, and no text is in the old dialect."""
 
 import ast
+import dataclasses
 import functools
 import importlib
 import inspect
@@ -9,7 +10,9 @@ import pkgutil
 import re
 from pathlib import Path
 
+import equinox as eqx
 import pytest
+from jaxtyping import Array, Float
 
 import jaxsub
 
@@ -76,6 +79,77 @@ def test_an_argument_that_is_not_named_is_seen():
         """Of `known`."""
 
     assert [name for name in arguments(f) if name not in (f.__doc__ or "")] == ["missing"]
+
+
+# what says how large a number is: a unit, or a word for what has none
+UNIT = re.compile(
+    r"(?<![\w`])√?(?:m|s|rad|N|N m|kg|SI|m/s²?|rad/s²?|kg/m³|rad/s/√Hz|m/s²/√Hz)(?![\w`/])"
+    r"|\b(units?|coordinates|whitened|relative|scaled|parts of|standard errors?|Jacobian|samples|key)\b"
+    r"|\b(how (many|often)|without a unit|unit length|σ|standard deviations)\b"
+)
+
+
+def array_fields(kind):
+    """Arrays that a class itself has as public fields, but an effect's numbers, which carry their unit in the code."""
+    own = vars(kind).get("__annotations__", {})
+    for field in dataclasses.fields(kind):
+        public = field.name in own and not field.name.startswith("_") and "unit" not in field.metadata
+        if public and re.search(r"\bArray\b|ndarray|(Float|Int|Bool)\[", str(field.type)):
+            yield field
+
+
+def shape_of(annotation):
+    """The named axes of an annotation of `jaxtyping`, without leading ones of any number."""
+    inner = (annotation, *getattr(annotation, "__args__", ()))
+    axes = next((one.dim_str.split() for one in inner if hasattr(one, "dim_str")), [])
+    return [axis for axis in axes if not axis.startswith("*")]
+
+
+def described(text, name):
+    """What the fields of a docstring say of one of them; None where they do not."""
+    until = r"(?=\n\s*-|\n\n|[.;,] (?:and )?`\w+`(?:, `\w+`)*:|\Z)"
+    found = re.search(rf"`{name}`(?:, `\w+`)*:(.*?){until}", text, re.DOTALL)
+    return found and found[1]
+
+
+def unstated(kind):
+    """Array fields of a class of which its docstring, or that of a base, lacks shape or unit."""
+    text = "\n".join(inspect.cleandoc(base.__doc__ or "") for base in kind.__mro__ if base not in (eqx.Module, object))
+    for field in array_fields(kind):
+        said = described(text, field.name)
+        if said is None:
+            yield f"{kind.__name__}.{field.name}: not described"
+        elif shape_of(field.type) and not re.search(r"\([^()]*,[^()]*\)", said):
+            yield f"{kind.__name__}.{field.name}: no shape {shape_of(field.type)} in: {said}"
+        elif "Float[" in str(field.type) and not UNIT.search(re.sub(r"\([^()]*,[^()]*\)", "", said, count=1)):
+            yield f"{kind.__name__}.{field.name}: no unit in: {said}"
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_docstrings_state_shape_and_unit_of_every_array_field(room):
+    """Claim: of each public dataclass and module of equinox, so that a reader need not look up who fills the field."""
+    module = importlib.import_module(room)
+    public = [getattr(module, name) for name in getattr(module, "__all__", ())]
+    kinds = [kind for kind in public if inspect.isclass(kind) and dataclasses.is_dataclass(kind)]
+    assert [fault for kind in kinds for fault in unstated(kind)] == []
+
+
+def test_an_array_field_without_shape_or_unit_is_seen():
+    class Known(eqx.Module):
+        """Two.
+
+        **Fields**
+
+        - `good`: (c,) m/s. `flat`: m. `bare`: (c,) what is left.
+        """
+
+        good: Float[Array, " c"]
+        flat: Float[Array, " c"]
+        bare: Float[Array, " c"]
+        absent: Float[Array, ""]
+
+    faults = [fault.partition(" in:")[0] for fault in unstated(Known)]
+    assert faults == ["Known.flat: no shape ['c']", "Known.bare: no unit", "Known.absent: not described"]
 
 
 @pytest.mark.parametrize("room", ROOMS[1:])
