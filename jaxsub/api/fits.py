@@ -345,6 +345,7 @@ class Fit(AbstractResult):
                 "null_directions": said.null_directions,
                 "equivalent_systems": [family.sentence() for family in said.families],
                 "verdicts": said.verdicts,
+                "tied": said.tied,
             },
             "coefficients": {e.name: _without_name(e) for e in self.estimates},
             "by_run": {one.name: self._by_run(one) for one in self.variations},

@@ -83,6 +83,13 @@ class Directions:
         errors[kept] = _spread(vectors, uncertainty)
         return errors
 
+    def error_of(self, slope: np.ndarray) -> float:
+        """Standard error of what changes by `slope` (p,) with relative changes; infinite where rounding hides it."""
+        hidden, shares = ~np.isfinite(self.uncertainty), slope @ self.vectors
+        if np.any(np.abs(shares[hidden]) > _ZERO * np.linalg.norm(slope)):
+            return float(np.inf)
+        return float(np.linalg.norm(shares[~hidden] * self.uncertainty[~hidden]))
+
     def alone(self) -> np.ndarray:
         """(p,) standard error of each coefficient in its own size if all the others were known."""
         return _inverse(np.linalg.norm(self.triangle, axis=0), self.largest)

@@ -1,6 +1,7 @@
 """What the recordings say about each coefficient, why they say no more, and what would help."""
 
 import dataclasses
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -10,7 +11,10 @@ from ..likelihood.blocks import Watch, nobody
 from .directions import FRACTION, Directions, subset
 from .equivalence import Family, equivalent_systems
 from .excitation import Excitation
+from .tied import tied_numbers
 
+# what is said of a number that follows from coefficients that leave it open
+FOLLOWS = "left open by what it follows"
 _SHOWN, _PARTNERS, _SHARE, _NAMED = 0.15, 5, 0.2, 3
 Kind = Literal[
     "identified",
@@ -20,6 +24,7 @@ Kind = Literal[
     "at its upper bound",
     "not converged",
     "fit does not explain the runs",
+    "left open by what it follows",
 ]
 # what is said once of all coefficients and not of each
 _OF_ALL = {
@@ -72,6 +77,7 @@ class Identifiability:
     - `null_directions`: for each direction left open, the relative change of each coefficient that matters in it.
     - `uncertainty`: of each direction, in the coefficients' own sizes, the worst first.
     - `verdicts`: one a coefficient. `families`: the equivalent systems behind them, none where no direction is open.
+    - `tied`: one for each number that follows from coefficients, of which its `partners` are those.
     """
 
     rank: int
@@ -80,6 +86,7 @@ class Identifiability:
     uncertainty: list[float]
     verdicts: tuple[CoefficientVerdict, ...] = ()
     families: tuple[Family, ...] = ()
+    tied: tuple[CoefficientVerdict, ...] = ()
 
     def __repr__(self) -> str:
         return "\n".join(self.sentences())
@@ -91,7 +98,7 @@ class Identifiability:
             terms = " ".join(f"{share:+.2f}·Δ{name}/{name}" for name, share in direction.items())
             wide = f"Open to {spread:.0%} of their size" if np.isfinite(spread) else "Open without limit"
             lines.append(f"{wide}: {terms}")
-        own = [v.sentence() for v in self.verdicts if v.kind != "identified" and v.kind not in _OF_ALL]
+        own = [v.sentence() for v in (*self.verdicts, *self.tied) if v.kind != "identified" and v.kind not in _OF_ALL]
         of_all = [
             f"{why[0].upper()}{why[1:]}." for kind, why in _OF_ALL.items() if kind in {v.kind for v in self.verdicts}
         ]
@@ -121,7 +128,8 @@ def identifiability(fit: Solution, assessment: Assessment | None = None, watch: 
     assessment = assess(fit) if assessment is None else assessment
     verdicts = tuple(_withheld(verdict, fit, assessment) for verdict in _verdicts(fit, directions, families))
     p = len(fit.names)
-    return Identifiability(p - len(open_), p, null, directions.uncertainty.tolist(), verdicts, families)
+    tied = tuple(_withheld(verdict, fit, assessment) for verdict in _tied_verdicts(fit, directions))
+    return Identifiability(p - len(open_), p, null, directions.uncertainty.tolist(), verdicts, families, tied)
 
 
 def identifiable_subset(fit: Solution) -> tuple[str, ...]:
@@ -162,6 +170,18 @@ def _verdicts(fit: Solution, directions: Directions, families: tuple[Family, ...
             CoefficientVerdict(name, "only in combination", error, partners, bool(mine), "; besides, ".join(remedies))
         )
     return tuple(made)
+
+
+def _tied_verdicts(fit: Solution, directions: Directions) -> Iterator[CoefficientVerdict]:
+    """Of each number that follows from coefficients, whether these are known well enough for it."""
+    for tied in tied_numbers(fit):
+        error = np.inf if {*tied.ends} & {*fit.at_bound} else directions.error_of(tied.slope * directions.size)
+        relative = error / abs(tied.value) if tied.value else np.inf
+        if relative <= FRACTION:
+            yield CoefficientVerdict(tied.name, "identified", relative, tied.ends)
+        else:
+            remedy = f"identify {' and '.join(tied.ends)}, or measure what {tied.name} makes"
+            yield CoefficientVerdict(tied.name, FOLLOWS, relative, tied.ends, remedy=remedy)
 
 
 def _withheld(verdict: CoefficientVerdict, fit: Solution, assessment: Assessment) -> CoefficientVerdict:

@@ -31,7 +31,7 @@ from .restoring import Restoring
 from .schema import unknown_key
 from .sensors import Output, Sensors
 from .submerged_body import SubmergedBody
-from .ties import Tie, tied_values
+from .ties import Tie, in_order, tied_rows, tied_values
 
 BODY_KEYS = (
     "mass", "weight", "buoyancy", "inertia", "centre_of_buoyancy", "centre_of_gravity", "speed", "length", "diameter",
@@ -98,6 +98,7 @@ def build(parts: VehicleParts) -> Vehicle:
     not positive definite, with the coefficients that make it so.
     """
     where, numbers, of_sensors = parts.where, parts.numbers, parts.sensor_numbers
+    parts = dataclasses.replace(parts, ties=in_order(parts.ties, where))
     _require_unlike(numbers, of_sensors, where)
     rows = tuple(row for _, row in (numbers | of_sensors).values())
     values = {key: number(value) for key, (value, _) in numbers.items()}
@@ -109,7 +110,7 @@ def build(parts: VehicleParts) -> Vehicle:
     if parts.kind == "submerged-body":
         values = _complete(values, where)
         hull = _sizes(values, hull)
-    rows += parts.effect_rows
+    rows = _under_ties(parts, (*rows, *parts.effect_rows), given | tied)
     spreads = {row.name: number(row.spread or math.nan) for row in rows if row.varies}
     # a number of the vehicle and not of its layout, for which programs are compiled
     layout = _layout(parts, tuple(dataclasses.replace(row, spread=0.0) for row in rows), hull)
@@ -123,6 +124,15 @@ def build(parts: VehicleParts) -> Vehicle:
     check_variation(vehicle, where)
     require_inertia(vehicle, where)
     return vehicle
+
+
+def _under_ties(parts: VehicleParts, rows: tuple[Parameter, ...], values: dict[str, float]) -> tuple[Parameter, ...]:
+    """The `rows` under what bounds and priors of ties say; stages have their own names there and those of `values`."""
+    names = stage_numbers(parts.actuators.items, parts.effects)
+    back = {own: alias for alias, own in names.items()}
+    named = tuple(dataclasses.replace(row, name=back.get(row.name, row.name)) for row in rows)
+    limited = tied_rows(parts.ties, named, values, parts.where)
+    return tuple(dataclasses.replace(row, name=names.get(row.name, row.name)) for row in limited)
 
 
 def _layout(parts: VehicleParts, rows: tuple[Parameter, ...], hull: dict[str, float]) -> Layout:
@@ -139,7 +149,8 @@ def _layout(parts: VehicleParts, rows: tuple[Parameter, ...], hull: dict[str, fl
     sizes = {key: hull.get(key, 0.0) for key in ("length", "diameter")}
     return Layout(
         parts.name, parts.kind, equations, positions, parts.inputs, parts.prescribed, parts.environment, parts.outputs,
-        rows, **sizes, system=parts.system, ties=parts.ties, input_units=tuple(parts.input_units.items()),
+        rows, **sizes, system=parts.system, ties=tuple(tie.alone for tie in parts.ties),
+        input_units=tuple(parts.input_units.items()),
     )  # fmt: skip
 
 
@@ -187,7 +198,8 @@ def _sizes(values: dict, hull: dict[str, float]) -> dict[str, float]:
     mass = float(values["mass"])
     rounded = lambda size: float(f"{size:.4g}")
     length = hull.get("length", rounded(math.sqrt(12.0 * float(values["I_y"]) / mass)))
-    diameter = hull.get("diameter", rounded(math.sqrt(4.0 * mass / STANDARD_DENSITY / (math.pi * length))))
+    density = hull.get("reference_density", STANDARD_DENSITY)
+    diameter = hull.get("diameter", rounded(math.sqrt(4.0 * mass / density / (math.pi * length))))
     return hull | {"length": length, "diameter": diameter}
 
 

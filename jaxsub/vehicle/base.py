@@ -29,6 +29,7 @@ from .description import described
 from .layout import Layout, deviation
 from .sensors.output import SPECIFIC_FORCE
 from .sensors.sensors import Sensors
+from .ties import followed
 from .variation import sample_by_sample
 
 
@@ -131,7 +132,9 @@ class AbstractVehicle(eqx.Module):
         if self.layout.ties:
             every, names = {**self.values(), **values}, self.aliases
             every |= {alias: every[name] for alias, name in names.items()}
-            values = {**values, **{names.get(tie.name, tie.name): tie.of(every) for tie in self.layout.ties}}
+            for tie in self.layout.ties:
+                every[tie.name] = tie.of(every)
+            values = {**values, **{names.get(tie.name, tie.name): every[tie.name] for tie in self.layout.ties}}
         vehicle = self.with_own_values(values)
         effects = []
         for effect in self.effects:
@@ -208,7 +211,7 @@ class AbstractVehicle(eqx.Module):
     def _force_of_run(self, motion: Motion) -> Float[Array, " n"]:
         run, equations = self.of_run(motion.positions), self.layout.equations
         force = run._force(dataclasses.replace(motion, actuation=run.actuation))
-        changed = {*self.spreads, *(tie.name for tie in self.layout.ties if {*tie.names} & {*self.spreads})}
+        changed = {*self.spreads, *(n for n, ends in followed(self.layout.ties).items() if {*ends} & {*self.spreads})}
         if not changed & self.linear:
             return force
         velocity = stack(motion.rates, equations, motion.rates[equations[0]])

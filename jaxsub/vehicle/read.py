@@ -17,12 +17,12 @@ from .assembly import BODY_KEYS, VECTORS, Vehicle, VehicleParts, build
 from .checks import check_count
 from .coefficient_units import coefficient_unit
 from .own import Model, channels_of, loaded
-from .scales import check_scaled, read_scales
+from .scales import check_scaled, read_scales, scaled
 from .schema import Table, read_number, read_option, unknown_key
 from .sensors import quantities_of
 from .sensors.read import Reading, read_columns, read_outputs
 from .submerged_body import ATTITUDES, CORIOLIS
-from .ties import Tie, read_tie
+from .ties import Tie, read_entry
 from .toml import check_tree, read_toml
 
 _TOP = ("schema", "name", "kind", "dof", "class", "coefficients", "inputs", "environment", "outputs", "effects")
@@ -61,7 +61,8 @@ def vehicle_from(
     top.only((*_TOP, *_OF_BODY))
     if kind == "model" and model is None:
         model = loaded(top.word("class"), folder or Path(), top.place("class"))
-    body, extra = _read_body(top) if kind == "submerged-body" else ({}, {})
+    tied: list[Tie] = []
+    body, extra = _read_body(top, tied) if kind == "submerged-body" else ({}, {})
     if kind == "mechanism":
         top.required("dof")
         check_count(top.names("dof") or (), where)
@@ -69,8 +70,8 @@ def vehicle_from(
     inputs, units = _read_inputs(top.table("inputs"), kind == "submerged-body", measured)
     names = tuple(name for name, _ in inputs)
     devices = read_actuators(top.table("actuators"), names, units, folder or Path())
-    coefficients, system, ties = _read_coefficients(
-        top.table("coefficients"), kind == "submerged-body", devices.input_units
+    coefficients, system = _read_coefficients(
+        top.table("coefficients"), kind == "submerged-body", devices.input_units, tied
     )
     prescribed, _ = read_columns(top.table("prescribed"), ("scale", "offset"), measured)
     environment, _ = read_columns(top.table("environment"), (), measured)
@@ -84,7 +85,7 @@ def vehicle_from(
     entries = data.get("effects", [])
     # only for a file with effects, since the vocabulary opens the metadata of every installed package
     kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)} if entries else {}
-    built_in, effect_rows = _read_effects(entries, where, kinds, quantities)
+    built_in, effect_rows = _read_effects(entries, where, kinds, quantities, tied)
     coriolis, attitude = _read_model(top.table("model"))
     parts = VehicleParts(
         where=where,
@@ -97,7 +98,7 @@ def vehicle_from(
         coriolis=coriolis,
         attitude=attitude,
         system=system,
-        ties=(*ties, *devices.ties, *measured.ties),
+        ties=(*tied, *devices.ties, *measured.ties),
         inputs=inputs,
         input_units={name: devices.input_units[name] for name in named},
         actuators=devices.actuators,
@@ -142,35 +143,30 @@ def _read_inputs(table: Table, body: bool, measured: Reading) -> tuple[tuple[tup
 
 
 def _read_coefficients(
-    table: Table, body: bool, units: dict[str, str]
-) -> tuple[dict[str, tuple[float, Parameter]], str, tuple[Tie, ...]]:
-    """The numbers of `[coefficients]` in SI, the system in which the file gives them in words, and its ties.
+    table: Table, body: bool, units: dict[str, str], ties: list[Tie]
+) -> tuple[dict[str, tuple[float, Parameter]], str]:
+    """The numbers of `[coefficients]` in SI, and the system in which the file gives them in words; ties go into `ties`.
 
     In a file with a `system` a number that states its `unit` is in SI all the same, and so is one by an input that has
     no symbol. `units` has the units of such inputs.
     """
     scales = read_scales(table.table("system")) if body and "system" in table.data else None
-    numbers, ties = {}, []
+    numbers = {}
     for name, entry in table.items():
         if name == "system" and scales is not None:
             continue
         place, unit = table.place(name), coefficient_unit(name, units) if body else ""
-        if isinstance(entry, str):
-            ties.append(read_tie(name, entry, place))
-            numbers[name] = 0.0, Parameter(name, unit, free=False)
-            continue
-        number = read_number(entry, place, Parameter(name, unit))
         stated = isinstance(entry, dict) and "unit" in entry
         term = derivative(name)
-        if scales is not None and not stated and term is not None and term.dimensional:
-            number = scales.si(term, *number)
-            check_scaled(number[0], place)
-        numbers[name] = number
-    return numbers, "" if scales is None else scales.text, tuple(ties)
+        scale = scales.unit(term) if scales and not stated and term is not None and term.dimensional else 1.0
+        number = read_entry(name, entry, place, Parameter(name, unit), "coefficients", ties, scale)
+        numbers[name] = scaled(*number, scale)
+        check_scaled(numbers[name][0], place)
+    return numbers, "" if scales is None else scales.text
 
 
-def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str, float]]:
-    """The numbers of `[body]`, vectors taken apart, and the hull's sizes."""
+def _read_body(top: Table, ties: list[Tie]) -> tuple[dict[str, tuple[float, Parameter]], dict[str, float]]:
+    """The numbers of `[body]`, vectors taken apart, and the hull's sizes; ties go into `ties`."""
     body = top.table("body")
     body.only(BODY_KEYS)
     numbers, hull = {}, {}
@@ -180,7 +176,8 @@ def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str
             if not isinstance(entry, list) or len(entry) != 3:
                 raise InputError(place, "is not three numbers", f"give {key} = [ , , ]")
             for name, item in zip(VECTORS[key], entry, strict=True):
-                numbers[name] = read_number(item, f"{place} ({name})", Parameter(name, coefficient_unit(name), False))
+                row = Parameter(name, coefficient_unit(name), False)
+                numbers[name] = read_entry(name, item, f"{place} ({name})", row, "body", ties)
         elif key in _SIZES:
             if isinstance(entry, dict) and (extra := [k for k in entry if k not in ("value", "unit")]):
                 raise InputError(f"{place}.{extra[0]}", f"{key} is not estimated", f"write {key} = …")
@@ -188,14 +185,14 @@ def _read_body(top: Table) -> tuple[dict[str, tuple[float, Parameter]], dict[str
             if hull[key] <= 0.0:
                 raise InputError(place, f"is {hull[key]:g}", "give a positive number")
         else:
-            numbers[key] = read_number(entry, place, Parameter(key, coefficient_unit(key), False))
+            numbers[key] = read_entry(key, entry, place, Parameter(key, coefficient_unit(key), False), "body", ties)
     return numbers, hull
 
 
 def _read_effects(
-    entries: Any, where: str, kinds: dict[str, type[AbstractEffect]], quantities: dict[str, str]
+    entries: Any, where: str, kinds: dict[str, type[AbstractEffect]], quantities: dict[str, str], ties: list[Tie]
 ) -> tuple[tuple[AbstractEffect, ...], tuple[Parameter, ...]]:
-    """The `[[effects]]` of a file; `quantities` of its outputs are as `Facts` has them."""
+    """The `[[effects]]` of a file; `quantities` of its outputs are as `Facts` has them, and ties go into `ties`."""
     effects, rows = [], []
     if not isinstance(entries, list):
         raise InputError(f"{where}: effects", "is not a list of tables", "write [[effects]] above each effect")
@@ -221,7 +218,8 @@ def _read_effects(
         values = {}
         for symbol, item in given.items():
             field = symbols[symbol]
-            values[field], table_rows[field] = read_number(item, f"{place}.parameters.{symbol}", table_rows[field])
+            row, own = table_rows[field], f"{place}.parameters.{symbol}"
+            values[field], table_rows[field] = read_entry(row.name, item, own, row, f"effects[{number}]", ties)
         effect = with_numbers(effect, values)
         if table.data.get("expression", effect.expression) != effect.expression:
             remedy = "delete the line; it says for a reader what the effect computes"

@@ -30,12 +30,16 @@ class Scales:
     time: float
     text: str
 
-    def si(self, term: Derivative, value: float, row: Parameter) -> tuple[float, Parameter]:
-        """The value of a derivative and its row in SI."""
+    def unit(self, term: Derivative) -> float:
+        """The unit of a derivative, SI."""
         mass, length, time = term.dimension
-        unit = self.mass**mass * self.length**length * self.time**time
-        scaled = {key: unit * getattr(row, key) for key in ("lower", "upper", "prior_std", "prior_mean", "spread")}
-        return unit * value, dataclasses.replace(row, **scaled)
+        return self.mass**mass * self.length**length * self.time**time
+
+
+def scaled(value: float, row: Parameter, unit: float) -> tuple[float, Parameter]:
+    """A number in units of `unit`, SI, and its row, in SI."""
+    named = {key: unit * getattr(row, key) for key in ("lower", "upper", "prior_std", "prior_mean", "spread")}
+    return unit * value, dataclasses.replace(row, **named)
 
 
 def read_scales(table: Table) -> Scales:

@@ -93,28 +93,42 @@ def read_number(entry: Any, place: str, default: Parameter) -> tuple[float, Para
             raise unknown_key(f"{place}.{key}", _NUMBER_KEYS, key)
     if "value" not in table.data:
         raise InputError(place, "has no value", "write { value = … }")
-    if isinstance(table.data["value"], str) and len(table.data) > 1 and not _spells_number(table.data["value"]):
-        remedy = "write the expression alone; bounds, prior and varies are for the numbers that it follows"
-        raise InputError(place, "has an expression beside other keys", remedy)
     value = read_finite(table.data["value"], place)
-    low, high = _bounds(table.data.get("bounds", [default.lower, default.upper]), place)
+    low, high = read_bounds(table, (default.lower, default.upper), place)
     if not low <= value <= high:
         raise InputError(place, f"value {value:g} lies outside its bounds [{low:g}, {high:g}]", "mend one of them")
     row = dataclasses.replace(default, lower=low, upper=high, **_variation(table, place))
     row = dataclasses.replace(row, free=_freedom(table, place, default.free or row.varies))
     if row.varies and not row.free:
         raise InputError(place, "is fixed and differs by run", "delete fixed, or varies")
+    usual = value if "prior_std" in table.data or not math.isfinite(row.prior_std) else row.prior_mean
+    std, mean = read_prior(table, (row.prior_std, usual), place)
+    return value, dataclasses.replace(row, prior_std=std, prior_mean=mean, unit=stated_unit(table, place, default.unit))
+
+
+def read_bounds(table: Table, default: tuple[float, float], place: str) -> tuple[float, float]:
+    """The bounds of a number, the `default` ones where its `table` has none."""
+    if "bounds" not in table.data:
+        return default
+    value = table.data["bounds"]
+    low, high = map(_real, value) if isinstance(value, list) and len(value) == 2 else (math.nan, math.nan)
+    if not low < high:
+        raise InputError(f"{place}.bounds", f"is {value!r:.60}", "write bounds = [low, high]")
+    return low, high
+
+
+def read_prior(table: Table, default: tuple[float, float], place: str) -> tuple[float, float]:
+    """Standard deviation and mean of a number's prior, those of `default` where its `table` does not say."""
+    std, mean = default
     if "prior_std" in table.data:
-        row = dataclasses.replace(row, prior_std=_real(table.data["prior_std"]), prior_mean=value)
-        if not row.prior_std > 0.0:
+        std = _real(table.data["prior_std"])
+        if not std > 0.0:
             raise InputError(f"{place}.prior_std", f"is {table.data['prior_std']!r:.60}", "give a positive number")
-    elif not math.isfinite(row.prior_std):
-        row = dataclasses.replace(row, prior_mean=value)
     if "prior_mean" in table.data:
-        if not math.isfinite(row.prior_std):
+        if not math.isfinite(std):
             raise InputError(f"{place}.prior_mean", "is given without prior_std", "add prior_std = …")
-        row = dataclasses.replace(row, prior_mean=read_finite(table.data["prior_mean"], f"{place}.prior_mean"))
-    return value, dataclasses.replace(row, unit=_unit(table, place, default.unit))
+        mean = read_finite(table.data["prior_mean"], f"{place}.prior_mean")
+    return std, mean
 
 
 def _variation(table: Table, place: str) -> dict[str, Any]:
@@ -141,7 +155,7 @@ def _freedom(table: Table, place: str, free: bool) -> bool:
     return free
 
 
-def _unit(table: Table, place: str, expected: str) -> str:
+def stated_unit(table: Table, place: str, expected: str) -> str:
     """The unit of a number, refused where its `table` states one that is not `expected` or not SI."""
     if "unit" not in table.data:
         return expected
@@ -207,22 +221,6 @@ def _real(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.nan
-
-
-def _spells_number(text: str) -> bool:
-    """Whether a text is a number in quotes, and so no expression."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _bounds(value: Any, place: str) -> tuple[float, float]:
-    low, high = map(_real, value) if isinstance(value, list) and len(value) == 2 else (math.nan, math.nan)
-    if not low < high:
-        raise InputError(f"{place}.bounds", f"is {value!r:.60}", "write bounds = [low, high]")
-    return low, high
 
 
 def read_column(column: Any, place: str, key: str) -> str:

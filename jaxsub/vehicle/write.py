@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -48,23 +49,26 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     # numbers in the order of the file that they are from, which compiled programs do not keep
     place = {name: index for index, name in enumerate(rows)}
     own = {name: values[name] for name in sorted(vehicle.own_values(), key=lambda name: place.get(name, len(place)))}
+    tied = {tie.name: tie.text for tie in layout.ties}
+    said = lambda name: tied.get(name) or _number_table(own[name], rows.get(name), Parameter(name, free=False))
     if isinstance(vehicle, SubmergedBody):
-        document["body"] = _body_table(vehicle, own, rows)
+        document["body"] = _body_table(vehicle, own, said)
         model = {"coriolis": vehicle.coriolis, "attitude": vehicle.attitude}
         usual = {"coriolis": CORIOLIS[0], "attitude": ATTITUDES[0]}
         if stated := {key: word for key, word in model.items() if word != usual[key]}:
             document["model"] = stated
-    coefficients, tied = tomlkit.table(), {tie.name: tie.text for tie in layout.ties}
+    coefficients = tomlkit.table()
     devices = vehicle.actuators if isinstance(vehicle, SubmergedBody) else Actuators()
     for name in (name for name in own if name not in devices.values() | vehicle.sensors.numbers):
+        if isinstance(vehicle, SubmergedBody) and name in _body_names():
+            continue
         if name in tied:
             coefficients[name] = tied[name]
-        elif not isinstance(vehicle, SubmergedBody) or name not in _body_names():
+        else:
             row = rows.get(name, Parameter(name, free=False))
             unit = "" if isinstance(vehicle, SubmergedBody) else row.unit
             coefficients[name] = _number_table(own[name], row, Parameter(name), unit)
     document["coefficients"] = coefficients
-    said = lambda name: tied.get(name) or _number_table(own[name], rows.get(name), Parameter(name, free=False))
     entry = lambda name, column: column_entry(name, column, dict(layout.input_units).get(name), vehicle.sensors, said)
     if layout.inputs:
         document["inputs"] = {name: entry(name, column) for name, column in layout.inputs}
@@ -80,7 +84,7 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     if effects:
         document["effects"] = tomlkit.aot()
     for effect in effects:
-        document["effects"].append(_effect_table(effect, rows))
+        document["effects"].append(_effect_table(effect, rows, tied))
     return tomlkit.dumps(document)
 
 
@@ -95,20 +99,19 @@ def _body_names() -> set[str]:
     return {name for key in BODY_KEYS for name in VECTORS.get(key, (key,))}
 
 
-def _body_table(vehicle: SubmergedBody, values: dict[str, float], rows: dict[str, Parameter]) -> Any:
+def _body_table(vehicle: SubmergedBody, values: dict[str, float], said: Callable[[str], Any]) -> Any:
     table = tomlkit.table()
     for key in BODY_KEYS:
         if key in VECTORS and VECTORS[key][0] in values:
-            items = [_number_table(values[name], rows.get(name), Parameter(name, free=False)) for name in VECTORS[key]]
-            table[key] = items
+            table[key] = [said(name) for name in VECTORS[key]]
         elif key in values:
-            table[key] = _number_table(values[key], rows.get(key), Parameter(key, free=False))
+            table[key] = said(key)
     table["reference_density"] = vehicle.restoring.reference_density
     table["length"], table["diameter"] = vehicle.layout.length, vehicle.layout.diameter
     return table
 
 
-def _effect_table(effect: AbstractEffect, rows: dict[str, Parameter]) -> Any:
+def _effect_table(effect: AbstractEffect, rows: dict[str, Parameter], tied: dict[str, str]) -> Any:
     table = tomlkit.table()
     table["effect"] = effect.name
     for field in option_fields(type(effect)):
@@ -116,7 +119,9 @@ def _effect_table(effect: AbstractEffect, rows: dict[str, Parameter]) -> Any:
             table[field.name.rstrip("_")] = list(value) if isinstance(value, tuple) else value
     table["expression"] = effect.expression
     symbols, numbers = effect.symbols(), parameter_table(effect)
-    written = lambda field, row: _number_table(float(getattr(effect, field)), rows.get(row.name), row)
+    written = lambda field, row: (
+        tied.get(row.name) or _number_table(float(getattr(effect, field)), rows.get(row.name), row)
+    )
     table["parameters"] = {symbols[field]: written(field, row) for field, row in numbers.items()}
     return table
 

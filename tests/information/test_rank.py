@@ -9,7 +9,7 @@ from lateral import lateral
 from rigs import driven, oscillator, stacked
 
 from jaxsub.estimate import SearchEnd, evaluate
-from jaxsub.information import identifiability, identifiable_subset
+from jaxsub.information import estimates, identifiability, identifiable_subset
 from jaxsub.results import RESULTS
 from jaxsub.simulation import synthetic
 
@@ -31,7 +31,7 @@ def at_truth(vehicle, noisier=1.0, still=()):
 @pytest.fixture(scope="module")
 def scaled():
     """An oscillator whose every term is free, so that its equation may be multiplied by any number."""
-    return at_truth(oscillator(coefficients=INERTIAL))
+    return at_truth(oscillator(coefficients=INERTIAL | {"F_x": "K_x / 40"}))
 
 
 def test_equation_that_may_be_multiplied_leaves_one_direction_open_and_says_so(scaled):
@@ -45,12 +45,20 @@ def test_equation_that_may_be_multiplied_leaves_one_direction_open_and_says_so(s
         assert (verdict.kind, verdict.structural) == ("only in combination", True)
         assert set(verdict.partners) == set(INERTIAL) - {verdict.name}
         assert "no input" in verdict.remedy
-    assert len(said.sentences()) == 1 + 1 + 4
+    assert len(said.sentences()) == 1 + 1 + 4 + 1
+
+
+def test_number_that_follows_from_an_open_one_is_open(scaled):
+    (tied,) = identifiability(scaled).tied
+    assert (tied.name, tied.kind, tied.partners) == ("F_x", "left open by what it follows", ("K_x",))
+    assert tied.relative_error == np.inf and tied.remedy.startswith("identify K_x")
+    assert {e.name: e.standard_error for e in estimates(scaled, identifiability(scaled), None)}["F_x"] is None
 
 
 def test_holding_the_subset_identifies_the_rest_and_it_is_the_inertia(scaled):
     assert identifiable_subset(scaled) == ("I_x",)
-    fixed = at_truth(oscillator(coefficients=INERTIAL | {"I_x": {"value": 1.0, "fixed": True}}))
+    tied = {"I_x": {"value": 1.0, "fixed": True}, "F_x": "D_x * K_x / 40"}
+    fixed = at_truth(oscillator(coefficients=INERTIAL | tied))
     said = identifiability(fixed)
     assert said.rank == said.parameters == 3
     assert [verdict.kind for verdict in said.verdicts] == ["identified"] * 3
@@ -58,6 +66,13 @@ def test_holding_the_subset_identifies_the_rest_and_it_is_the_inertia(scaled):
     # the same numbers as the covariance of the fit, by another way
     expected = [fixed.standard_errors[name] / INERTIAL[name] for name in fixed.names]
     np.testing.assert_allclose([verdict.relative_error for verdict in said.verdicts], expected, rtol=1e-6)
+    # of a product of two, by their covariance and its derivatives by hand
+    slope = np.array([{"D_x": 4.0, "K_x": 0.6}.get(name, 0.0) for name in fixed.names]) / 40.0
+    error = np.sqrt(slope @ np.asarray(fixed.covariance) @ slope)
+    own = {estimate.name: estimate for estimate in estimates(fixed, said, None)}["F_x"]
+    assert (own.value, own.standard_error_white) == pytest.approx((0.06, error), rel=1e-9)
+    assert said.tied[0].kind == "identified"
+    assert said.tied[0].relative_error == pytest.approx(error / 0.06, rel=1e-6)
 
 
 def test_prior_on_one_of_the_combination_identifies_all():

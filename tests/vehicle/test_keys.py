@@ -131,3 +131,13 @@ def test_coupling_on_both_sides_and_idle_drive_of_a_mechanism_are_reported():
     assert [(finding.check, finding.severity) for finding in found] == [("coupling", "note"), ("idle-input", "warning")]
     assert "D_y_x" in found[0].line()
     assert "brake" in found[1].line()
+
+
+def test_diameter_that_is_not_given_is_that_of_the_mass_in_the_water_of_the_file():
+    """Claim: a cylinder of that diameter and length displaces the mass, in sea water where the file does not say."""
+    body = {"mass": 60.0, "inertia": [1.0, 12.0, 12.0], "length": 2.0}
+    for density, more in ((1025.0, {}), (998.0, {"reference_density": 998.0})):
+        tree = tomllib.loads(BODY)
+        tree["body"] = {"speed": 1.5} | body | more
+        diameter = vehicle_from(tree, "vehicle.toml").layout.diameter
+        assert density * math.pi / 4.0 * diameter**2 * 2.0 == pytest.approx(60.0, rel=1e-3)

@@ -132,7 +132,7 @@ REFUSED = {
     "buoyancy.spread: is -1; give a positive number": {"body.buoyancy": {"varies": "run", "spread": -1.0}},
     "buoyancy: is fixed and differs by run; delete fixed, or varies": {"body.buoyancy": BY_RUN | {"fixed": True}},
     "Z_w: value -90 lies outside its bounds": {"coefficients.Z_w": {"bounds": [-10.0, 0.0]}},
-    "Z_w: has an expression beside other keys; write the expression alone": {
+    "Z_w.varies: stands beside an expression; delete it, or write it beside what this follows": {
         "coefficients.Z_w": BY_RUN | {"value": "-N_r"}
     },
     "Z_w.prior_std: is -2; give a positive number": {"coefficients.Z_w": {"prior_std": -2}},

@@ -27,8 +27,9 @@ def arrays(values):
     return {name: jnp.asarray(value) for name, value in values.items()}
 
 
-def hull(**more):
-    return vehicle_from(TREE | {"coefficients": TREE["coefficients"] | more}, "hull.toml")
+def hull(body=None, **more):
+    tree = TREE | {"body": TREE["body"] | (body or {}), "coefficients": TREE["coefficients"] | more}
+    return vehicle_from(tree, "hull.toml")
 
 
 TIES = {
@@ -92,7 +93,7 @@ def test_fit_of_tied_fins_counts_them_once_and_knows_them_better():
 REFUSED = {
     "no name": ("-1.5", "names no other number", "without quotation marks"),
     "unknown": ("-K_delta_re", "follows K_delta_re, which is no number", "did you mean K_delta_er?"),
-    "itself": ("-K_delta_el", "follows K_delta_el, which follows others", "in terms of those"),
+    "itself": ("-K_delta_el", "follows K_delta_el itself", "give one of them a number"),
     "call": ("abs(K_p)", "is no expression", "+ - * / **"),
     "open": ("-(K_p", "is no expression", "+ - * / **"),
     "attribute": ("K_p.real", "follows K_p.real, which is no number of the vehicle", "known: "),
@@ -126,3 +127,63 @@ def test_a_product_over_the_speed_is_one_name_in_an_expression():
     """Claim: `Y_vvv/U` is the coefficient and not a quotient, also before a division by a number."""
     vehicle = hull(**{"Y_vvv/U": -3.0, "Y_vvr/U": "Y_vvv/U / 20"})
     assert float(vehicle.values()["Y_vvr/U"]) == pytest.approx(-0.15)
+
+
+def test_body_follows_expressions_and_expressions_follow_each_other():
+    """Claim: body data are tied as coefficients are, in any order of the file, and are written as they were read."""
+    told = {"buoyancy": "weight", "weight": "9.81 * mass", "inertia": [1.0, 12.0, "I_y"]}
+    vehicle = hull(told, K_delta_el="-K_delta_er", Y_delta_el="K_delta_el / 0.2")
+    moved = vehicle.with_values(arrays({"mass": 70.0, "I_y": 13.0, "K_delta_er": 2.0})).values()
+    found = [float(moved[name]) for name in ("weight", "buoyancy", "I_z", "Y_delta_el")]
+    np.testing.assert_allclose(found, [9.81 * 70.0, 9.81 * 70.0, 13.0, -10.0], rtol=1e-14)
+    again = vehicle_from(tomllib.loads(vehicle_text(vehicle)), "again.toml")
+    assert vehicle_text(again) == vehicle_text(vehicle)
+    assert tomllib.loads(vehicle_text(vehicle))["body"]["buoyancy"] == "weight"
+    with pytest.raises(InputError, match=r"K_p: .* follows K_p itself, if through others"):
+        hull(K_delta_el="2 * K_p", K_p="K_delta_el / 2")
+
+
+def test_number_of_an_effect_follows_others():
+    """Claim: an effect's number may follow a coefficient's, in use and when written."""
+    lag = {"effect": "actuator-lag", "actuator": "elevator_right", "parameters": {"T": "-K_p / 10"}}
+    vehicle = vehicle_from(TREE | {"effects": [lag]}, "hull.toml").with_values(arrays({"K_p": -3.0}))
+    assert float(vehicle.values()["actuator-lag[elevator_right].T"]) == pytest.approx(0.3)
+    again = vehicle_from(tomllib.loads(vehicle_text(vehicle)), "again.toml")
+    assert vehicle_text(again) == vehicle_text(vehicle)
+
+
+def test_bounds_and_prior_of_an_expression_are_those_of_the_number_that_it_follows():
+    r"""Claim: of $-2\theta + 1$ they hold for $\theta$, and two priors are one with the product of their densities."""
+    entry = {"value": "1 - 2 * K_delta_er", "bounds": [-5.0, -1.0], "prior_std": 0.2, "prior_mean": -2.2}
+    own = {"value": 1.5, "prior_std": 0.3, "prior_mean": 1.4, "bounds": [1.2, 9.0]}
+    row = {row.name: row for row in hull(K_delta_el=entry, K_delta_er=own).layout.free}["K_delta_er"]
+    assert (row.lower, row.upper) == pytest.approx((1.2, 3.0))
+    at = np.linspace(0.0, 3.2, 2001)
+    density = np.exp(-0.5 * ((at - 1.4) / 0.3) ** 2 - 0.5 * ((1.0 - 2.0 * at + 2.2) / 0.2) ** 2)
+    mean = np.sum(at * density) / np.sum(density)
+    assert row.prior_mean == pytest.approx(mean, rel=1e-6)
+    assert row.prior_std == pytest.approx(np.sqrt(np.sum((at - mean) ** 2 * density) / np.sum(density)), rel=1e-6)
+    vehicle = hull(K_delta_el=entry, K_delta_er=own)
+    again = vehicle_from(tomllib.loads(vehicle_text(vehicle)), "again.toml")
+    assert again.layout.free == vehicle.layout.free
+    # through another expression, and about the value where no mean is given
+    chain = hull(K_delta_el="K_delta_er / 2", Y_delta_el={"value": "4 * K_delta_el", "prior_std": 0.5})
+    row = {row.name: row for row in chain.layout.free}["K_delta_er"]
+    assert (row.prior_mean, row.prior_std) == pytest.approx((1.5, 0.25))
+
+
+LIMITED = {
+    "fixed": ({"value": "-K_delta_er", "fixed": True}, "fixed: stands beside an expression; delete it"),
+    "key": ({"value": "-K_delta_er", "bound": [0, 1]}, "bound: unknown key; did you mean bounds?"),
+    "outside": ({"value": "-K_delta_er", "bounds": [0, 1]}, "value -1.5 lies outside its bounds"),
+    "two": ({"value": "K_p - N_v / 2", "prior_std": 1.0}, "give bounds and prior to K_p and N_v"),
+    "curved": ({"value": "0.1 * K_p * K_p", "prior_std": 1.0}, "give bounds and prior to K_p"),
+    "unit": ({"value": "-K_delta_er", "unit": "N"}, "unit: is 'N', and the number is in N.m/rad"),
+}
+
+
+@pytest.mark.parametrize("case", LIMITED)
+def test_what_cannot_stand_beside_an_expression_is_refused(case):
+    entry, said = LIMITED[case]
+    with pytest.raises(InputError, match=rf"hull\.toml: coefficients\.K_delta_el.*{said}"):
+        hull(K_delta_el=entry)

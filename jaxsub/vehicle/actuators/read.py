@@ -9,8 +9,8 @@ from ...effects import AbstractActuator
 from ...errors import InputError, nearest
 from ...parameters import Parameter, number
 from ...units import same_dimension
-from ..schema import Table, read_finite, read_number
-from ..ties import Tie, read_tie
+from ..schema import Table, read_finite
+from ..ties import Tie, is_tied, read_entry
 from .ballast import Ballast, MovingMass
 from .base import Actuator, Actuators
 from .keys import Flag, Function, Number, Pair, Vector, Word, read_limits
@@ -112,12 +112,9 @@ def _number(
     item: Actuator, name: str, key: str, entry: Any, place: str, unit: str, ties: list[Tie]
 ) -> tuple[float, Parameter]:
     row = Parameter(name, item.unit_of(key, unit), free=False)
-    if isinstance(entry, str):
-        ties.append(read_tie(name, entry, place, "actuators"))
-        return 0.0, row
-    value, row = read_number(entry, place, row)
+    value, row = read_entry(name, entry, place, row, "actuators", ties)
     spec = item.keys[key]
-    if isinstance(spec, Number) and spec.positive and value <= 0.0:
+    if isinstance(spec, Number) and spec.positive and value <= 0.0 and not is_tied(entry):
         raise InputError(place, f"is {value:g}", "give a positive number")
     return value, row
 

@@ -13,8 +13,8 @@ from ...effects import (
 )
 from ...errors import InputError
 from ...parameters import Parameter
-from ..schema import Table, read_number
-from ..ties import Tie, read_tie
+from ..schema import Table
+from ..ties import Tie, is_tied, read_entry
 from .base import Actuator
 
 # in the order in which a command passes them
@@ -46,11 +46,10 @@ def read_stages(
         per = {"rate_limit": unit and f"({unit})/s"}.get(key, "s")
         row = Parameter(row.name, per, free=False, lower=row.lower)
         entry, place = table.data[key], table.place(key)
-        if isinstance(entry, str):
-            ties.append(read_tie(f"{actuator.name}.{key}", entry, place, "actuators"))
+        value, row = read_entry(f"{actuator.name}.{key}", entry, place, row, "actuators", ties)
+        if is_tied(entry):
             found.append((kind(actuator=name), row))
             continue
-        value, row = read_number(entry, place, row)
         if value <= 0.0:
             raise InputError(place, f"is {value:g}", "give a positive number")
         found.append((kind(actuator=name, **{field: value}), row))

@@ -10,8 +10,8 @@ from ...errors import InputError
 from ...parameters import Parameter
 from ...units import same_dimension
 from ..actuators.keys import Vector
-from ..schema import Table, read_column, read_finite, read_number, read_positive, read_unit
-from ..ties import Tie, read_tie
+from ..schema import Table, read_column, read_finite, read_positive, read_unit
+from ..ties import Tie, is_tied, read_entry
 from .keys import check_channels, check_keys
 from .output import FRAMES, RAW_UNITS, STILL, WRAPS, Output, channel_unit
 from .sensors import MOUNTING
@@ -37,11 +37,7 @@ class Reading:
     def number(self, name: str, entry: Any, place: str, unit: str, section: str) -> None:
         """Add the number `name` as the file has it, fixed where it does not say."""
         row = Parameter(name, unit, free=False)
-        if isinstance(entry, str):
-            self.ties.append(read_tie(name, entry, place, section))
-            self.numbers[name] = 0.0, row
-            return
-        self.numbers[name] = read_number(entry, place, row)
+        self.numbers[name] = read_entry(name, entry, place, row, section, self.ties)
 
     def line(
         self, table: Table, name: str, channel: str, units: tuple[str, str], entries: dict[str, Any], section: str
@@ -53,7 +49,7 @@ class Reading:
         for key, entry in entries.items():
             unit = recorded if key == "offset" else _ratio(recorded, true)
             self.number(f"{name}.{key}", entry, table.place(key), unit, section)
-            if key == "scale" and self.numbers[f"{name}.{key}"][0] == 0.0 and not isinstance(entry, str):
+            if key == "scale" and self.numbers[f"{name}.{key}"][0] == 0.0 and not is_tied(entry):
                 raise InputError(table.place(key), "is 0", "give what one of the channel's unit is in the column")
 
 
