@@ -28,7 +28,7 @@ MISTAKES = {
     "kind": ("submerged-body", "submerged-bdy", ": kind: 'submerged-bdy' is not known; did you mean submerged-body?"),
     "no mass": ("mass = 50.0", "", ": body.mass: is missing; add mass = … in kg"),
     "negative mass": ("mass = 50.0", "mass = -50.0", ": body.mass: is -50; give a positive number"),
-    "text for a number": ("mass = 50.0", 'mass = "50"', ": body.mass: '50' is not a finite number; "),
+    "text for a number": ("mass = 50.0", 'mass = "50"', ": body.mass: '50' names no other number; write a "),
     "infinite": ("mass = 50.0", "mass = inf", ": body.mass: inf is not a finite number; "),
     "too large": ("mass = 50.0", "mass = 1" + "0" * 400, ": body.mass: 1000"),
     "true for a number": ("mass = 50.0", "mass = true", ": body.mass: True is not a finite number; "),
