@@ -1,4 +1,4 @@
-"""Physics that effects.md lacks: the right answer is `unknown`, and where."""
+"""Physics that the vocabulary lacks: the right answer is `unknown`, and where."""
 
 import jax.numpy as jnp
 

@@ -52,8 +52,8 @@ class Truth:
 
     **Fields**
 
-    - `name`: as in effects.md, or `outside …` for what the vocabulary lacks; `form`: which equation, actuator or
-      sensor; `family` as in effects.md.
+    - `name`: as in the vocabulary, or `outside …` for what that lacks; `form`: which equation, actuator or
+      sensor; `family` as in the vocabulary.
     - `where`: the places that count as its location; `lenient`: those that count when one is lenient.
     - `limit`: the size beyond which it would be another kind of thing (a fin's travel, a capsize).
     - `vehicle`: which body it is concealed in.

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, final
 
+from ..checks.estimated_noise import HARDLY_FOLLOWED, hardly_followed
 from ..discrepancy import Conclusions
 from ..discrepancy import diagnose as conclude
 from ..discrepancy.decisions import decision_rows
@@ -16,6 +17,7 @@ from ..discrepancy.stored import STORED, load_conclusions, save_conclusions
 from ..effects import AbstractEffect
 from ..errors import InputError
 from ..estimate import require_free
+from ..findings import Finding
 from ..plain import to_json
 from ..recording import Recording, hold_out, load, save
 from ..recording.recording import Recordings
@@ -79,7 +81,17 @@ def diagnosed(
     conclusions, improved = conclude(
         vehicle, train, test, vocabulary=kinds, progress=progress, budget=budget, stop=stop, keep=handed, begin=begin
     )
-    return Diagnosis(conclusions, improved)
+    return Diagnosis(_warned(conclusions, vehicle, train), improved)
+
+
+def _warned(conclusions: Conclusions, vehicle: AbstractVehicle, train: Sequence[Recording]) -> Conclusions:
+    """The same with a warning of channels that even the improved model hardly follows."""
+    found = hardly_followed(vehicle, {channel.channel: channel.sigma for channel in conclusions.channels}, train)
+    return dataclasses.replace(
+        conclusions,
+        notes=[*conclusions.notes, *(finding.line() for finding in found)],
+        findings=(*conclusions.findings, *found),
+    )
 
 
 @final
@@ -144,6 +156,11 @@ class Diagnosis(AbstractResult):
     def notes(self) -> list[str]:
         """What a reader must know besides."""
         return self.conclusions.notes
+
+    @property
+    def warnings(self) -> list[Finding]:
+        """Channels that even the improved model hardly follows, so that the verdict says little."""
+        return [finding for finding in self.conclusions.findings if finding.check == HARDLY_FOLLOWED]
 
     @property
     def complete(self) -> bool:

@@ -124,7 +124,8 @@ def _show(content: dict[str, Any], checked: Checked) -> None:
     if listed:
         terminal.table(("severity", "check", "where", "channel", "rows", "times (s)", "what"), listed)
     errors, warnings = content["errors"], content["warnings"]
-    terminal.say(f"{errors} errors, {warnings} warnings, {len(checked.findings) - errors - warnings} notes")
+    counts = {"error": errors, "warning": warnings, "note": len(checked.findings) - errors - warnings}
+    terminal.say(", ".join(f"{count} {kind}{'' if count == 1 else 's'}" for kind, count in counts.items()))
 
 
 def _channel_row(channel: dict[str, Any], checked: Checked) -> tuple[str, ...]:

@@ -51,6 +51,7 @@ def run(
         answer = answered(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget, keep, first)
         # shown before it is written: where writing fails, minutes of work are not lost
         emit(answer, explain)
+        terminal.warn(answer.warnings)
         with fresh() as folder:
             answer.write(folder)
     terminal.note(f"report: {out / 'report.html'}")

@@ -11,7 +11,7 @@ import jaxsub
 
 HOUSE = Path(jaxsub.__file__).parent
 FILES = sorted(HOUSE.rglob("*.py"))
-# design.md, with effects before vehicle, which has them built in
+# lowest first; effects come before vehicle, which has them built in
 ORDER = (
     "errors", "findings", "plain", "fingerprint", "programs", "storage", "unit_names", "units", "arrays", "methods",
     "parameters", "results", "symbolic", "recording", "effects", "sensors", "vehicle", "simulation", "filter",

@@ -48,7 +48,7 @@ def test_a_warning_is_in_table_file_and_figure_and_does_not_stop(rig, monkeypatc
     rewrite(rig, "x", with_sentinels)
     code, shown = check(rig, monkeypatch, capsys)
     assert code in (0, None), shown.err
-    assert "sentinel" in shown.out and "1 warnings" in shown.out
+    assert "sentinel" in shown.out and ", 1 warning, " in shown.out
     content = json.loads((rig / "out" / "check.json").read_text())
     (finding,) = content["findings"]
     assert (finding["check"], finding["channel"], finding["count"]) == ("sentinel", "x", 20)
@@ -62,7 +62,7 @@ def test_a_warning_is_in_table_file_and_figure_and_does_not_stop(rig, monkeypatc
 def test_an_error_ends_with_2_and_is_written_all_the_same(rig, monkeypatch, capsys):
     rewrite(rig, "x_rate", np.rad2deg)
     code, shown = check(rig, monkeypatch, capsys)
-    assert code == 2 and "degrees?" in shown.out and "1 errors" in shown.out
+    assert code == 2 and "degrees?" in shown.out and "1 error, " in shown.out
     (finding,) = json.loads((rig / "out" / "check.json").read_text())["findings"]
     assert (finding["check"], finding["severity"]) == ("factor", "error")
 

@@ -28,7 +28,7 @@ from jaxsub.effects import (
 )
 from jaxsub.units import si_unit
 
-# diagnoses name effects by these, so none may be renamed; the last two are this project's additions to effects.md
+# diagnoses name effects by these, so none may be renamed; the last two came later
 NAMES = """
 quadratic-damping cubic-damping crossflow-drag coriolis-coupling turning-speed-loss speed-scaling hull-asymmetry
 fluid-memory trim-offset buoyancy-error hull-compressibility density-stratification thermal-expansion mass-shift

@@ -154,7 +154,7 @@ def test_a_false_alarm_names_physics_where_nothing_is_concealed(verdict, alarm, 
 
 
 def test_every_concealed_effect_is_of_a_known_kind():
-    """Claim: the families of the concealed effects are those of effects.md, so that none is structure by mistake."""
+    """Claim: families of the concealed effects are those of the vocabulary, so that none is structure by mistake."""
     known = {"hull", "hydrostatics", "propulsion", "mechanisms", "outside", *scoring.KINDS}
     assert {truth.family for truth in truths.TRUTHS.values()} == known
 

@@ -41,7 +41,7 @@ def test_equation_6_of_the_paper_is_a_family(drifting):
     assert family.reinterpreted == ("v",)
     np.testing.assert_allclose(family.tangent.S, np.outer([1, 0, 0, 0, 0], [0, 1, 0, 0, 0]), atol=1e-9)
     np.testing.assert_allclose(family.tangent.T, np.zeros((3, 3)), atol=1e-9)
-    # equations.md section 2, and the same for roll and yaw: the fourth column of MP and of AP
+    # the first paper's eq. 6, and the same for roll and yaw: the fourth column of MP and of AP
     expected = {"Y_pdot": c["Y_vdot"] - c["mass"], "K_pdot": c["K_vdot"], "N_pdot": c["N_vdot"]}
     expected |= {"Y_p": c["Y_v"], "K_p": c["K_v"], "N_p": c["N_v"]}
     assert family.coefficients == pytest.approx(expected, rel=1e-7)

@@ -24,7 +24,7 @@ def nps():
 
 
 def paper(state, delta, c):
-    """Eq. 1 as equations.md §1 prints it, with the coefficients `c`."""
+    """The first paper's eq. 1, misprints corrected, with the coefficients `c`."""
     u, v, w, p, q, r, phi, theta, _, _ = state
     delta_r, delta_er, delta_el = delta
     m, U, W, B = c["mass"], c["speed"], c["weight"], c["buoyancy"]

@@ -35,6 +35,14 @@ def test_a_rig_has_the_numbers_of_its_log():
     assert sorted(unused) == ["status", "two words"]
 
 
+def test_damping_is_that_of_a_rig_that_dissipates():
+    """Claim: a log that grows, as a decay does which begins with a push by hand, gives the size with the other sign."""
+    t = 0.05 * np.arange(400)
+    text, _ = rig_file(Recording("run", t, {"x": np.exp(0.1 * t) * np.sin(2.0 * t)}, "run.csv"))
+    found = tomllib.loads(text)["coefficients"]["D_x"]
+    assert found["value"] == pytest.approx(0.2, rel=0.05)
+
+
 def test_units_say_what_drives_a_rig_whatever_its_name():
     log = logged(0.0)
     renamed = {{"force": "c"}.get(name, name): values for name, values in log.columns.items()}

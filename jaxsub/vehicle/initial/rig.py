@@ -23,8 +23,9 @@ def rig_file(log: Recording) -> tuple[str, list[str]]:
 
     Columns with the name or the unit of a drive are inputs, all others that change are coordinates, and `q_rate` beside
     `q` its rate. Damping, stiffness, gains and constants are those of least squares of each coordinate's second
-    derivative, with the inertia 1; a standard deviation as large as each number stands beside it. Derivatives are those
-    of local polynomials, which noise makes smaller than they are. Source: Savitzky and Golay (1964); Ljung (1999), §7.
+    derivative, with the inertia 1; a standard deviation as large as each number stands beside it. Damping is taken
+    positive. Derivatives are those of local polynomials, which noise makes smaller than they are.
+    Source: Savitzky and Golay (1964); Ljung (1999), §7.
 
     **Raises** `InputError` for a log without a coordinate, and for one too short.
     """
@@ -39,7 +40,8 @@ def rig_file(log: Recording) -> tuple[str, list[str]]:
     lines = [
         "# Begun by `jaxsub init rig` from the columns of a log, which may have any consistent units.",
         "# The inertia is 1, so that damping, stiffness and gains are per unit of it. Numbers are by least squares on",
-        "# differences of the log, each with itself for its standard deviation. Delete those that the rig has not.",
+        "# differences of the log, each with itself for its standard deviation.",
+        "# Delete the coordinates and numbers that are not of interest.",
         "schema = 1",
         'name = "Rig"',
         'kind = "mechanism"',
@@ -81,5 +83,7 @@ def _regressed(log: Recording, q: str, drives: list[str]) -> dict[str, float]:
     # local polynomials have no whole window at the ends
     inside = slice(_WINDOW, -_WINDOW)
     solved = np.linalg.lstsq(regressors[inside], derivative(2)[inside], rcond=None)[0]
+    # a rig dissipates: damping that comes out negative is that of noise, and a fit that begins there diverges
+    solved[0] = abs(solved[0])
     names = (f"D_{q}", f"K_{q}", *(f"B_{q}_{name}" for name in drives), f"F_{q}")
     return {name: float(number(value)) for name, value in zip(names, solved, strict=True)}
