@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from jaxsub.estimate import Rate
+
 from ..tables import table
 
 _ROWS = 8
@@ -9,10 +11,25 @@ _HEADER = ("vehicle", "concealed", "answer", "", "test error, σ", "s")
 
 
 def tables(results: dict[str, Any]) -> dict[str, str]:
-    """What was concealed in each vehicle and what was answered, in parts of at most eight cases."""
+    """What was concealed in each vehicle and what was answered, in parts of at most eight cases; how many are right."""
     rows = [_row(line) for line in results["cases"]]
     starts = range(0, len(rows), _ROWS)
-    return {f"answers, part {n}": table(_HEADER, rows[at : at + _ROWS]) for n, at in enumerate(starts, 1)}
+    made = {f"answers, part {n}": table(_HEADER, rows[at : at + _ROWS]) for n, at in enumerate(starts, 1)}
+    return made | {"counts": table(["of all cases", "", "95 % interval"], _counts(results["cases"]))}
+
+
+def _counts(cases: list[dict[str, Any]]) -> list[list[str]]:
+    """Right answers, and false alarms where nothing is concealed."""
+    clean = [line for line in cases if line["concealed"] == "nothing"]
+    named = sum(line["answer"].get("verdict") != "none" for line in clean)
+    rates = {
+        "right answers": Rate(sum(line["mark"] == "right" for line in cases), len(cases)),
+        "false alarms where nothing is concealed": Rate(named, len(clean)),
+    }
+    return [
+        [words, f"{rate.successes} of {rate.count}", "–".join(f"{100.0 * end:.0f}" for end in rate.interval) + " %"]
+        for words, rate in rates.items()
+    ]
 
 
 def _row(line: dict[str, Any]) -> list[str]:

@@ -65,6 +65,13 @@ def test_every_table_of_numbers_names_its_command(title):
                 assert EXPERIMENT.search(TEXTS[page[1]] if page else row), f"no command in: {row[:80]}"
 
 
+@pytest.mark.parametrize("row", [row for row in README.splitlines() if MADE_ON.search(row)])
+def test_counts_of_readme_stand_on_the_page_that_they_are_from(row):
+    """Claim: a page whose numbers were measured anew leaves no earlier ones in README."""
+    page = TEXTS[MADE_ON.search(row)[1]]
+    assert [count for count in re.findall(r"\d+ of \d+", row) if count not in page] == []
+
+
 @pytest.mark.parametrize(("module", "options"), experiments())
 def test_every_command_exists_with_what_it_is_given(module, options):
     spec = importlib.util.find_spec(module)
