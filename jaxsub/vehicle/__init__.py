@@ -7,7 +7,8 @@ from .checks import require_inertia
 from .dimensions import check_units
 from .from_python import own_model
 from .gazebo import read_sdf, sdf_text
-from .initial import InitialFile, initial_file, published_file, rig_file
+from .initial import InitialFile, initial_file, rig_file
+from .like import published_file
 from .mechanism import Mechanism
 from .oddities import vehicle_findings
 from .own import Model, OwnModel

@@ -23,7 +23,7 @@ from .checks import (
 )
 from .damping import Damping
 from .inertia import CENTRE_OF_GRAVITY, RIGID, Inertia
-from .layout import deviation
+from .layout import Geometry, deviation
 from .mechanism import Mechanism
 from .own import Model, OwnModel, check_model, model_of
 from .products import Products
@@ -66,6 +66,7 @@ class VehicleParts:
     - `coriolis`: of a body, one of `CORIOLIS`; `attitude`: one of `ATTITUDES`.
     - `system`: in which the file gives its coefficients, as text.
     - `hull`: `length`, `diameter` (m; worked out from mass and inertia where absent), `reference_density` (kg/m³).
+    - `geometry`: that the file states, from which coefficients can be estimated.
     - `effects`: those that the model has already, and `effect_rows` the rows of their free numbers.
     """
 
@@ -79,6 +80,7 @@ class VehicleParts:
     prescribed: Pairs
     environment: Pairs
     hull: dict[str, float]
+    geometry: Geometry | None
     model: type[Model] | Model | None
     coriolis: str
     attitude: str
@@ -150,7 +152,7 @@ def _layout(parts: VehicleParts, rows: tuple[Parameter, ...], hull: dict[str, fl
     return Layout(
         parts.name, parts.kind, equations, positions, parts.inputs, parts.prescribed, parts.environment, parts.outputs,
         rows, **sizes, system=parts.system, ties=tuple(tie.alone for tie in parts.ties),
-        input_units=tuple(parts.input_units.items()),
+        input_units=tuple(parts.input_units.items()), geometry=parts.geometry,
     )  # fmt: skip
 
 

@@ -9,6 +9,9 @@ from .attitude import EULER, QUATERNION
 from .sensors.output import ANGLES, SPECIFIC_FORCE, Output, channel_unit
 from .ties import Tie
 
+# what a file says of a vehicle's shape: a kind of `jaxsub init` and (dimension, SI) pairs
+Geometry = tuple[str, tuple[tuple[str, float], ...]]
+
 
 def deviation(name: str) -> str:
     """The state that is a run's deviation from the mean of the number `name`, which differs by run."""
@@ -31,6 +34,7 @@ class Layout:
     - `length`, `diameter`: of the hull, m.
     - `ties`: numbers that follow from others.
     - `input_units`: (input, SI unit) pairs of inputs other than those with a symbol, where that is known.
+    - `geometry`: from which coefficients can be estimated, where the file states it.
     - `system`: in which the vehicle file gives its coefficients, in words; empty where they are in SI.
     """
 
@@ -48,6 +52,7 @@ class Layout:
     system: str = ""
     ties: tuple[Tie, ...] = ()
     input_units: tuple[tuple[str, str], ...] = ()
+    geometry: Geometry | None = None
 
     @property
     def held(self) -> tuple[str, ...]:

@@ -7,11 +7,13 @@ from ..effects import EQUATIONS, GRAVITY, VELOCITIES, ActuatorGain, derivative
 from ..findings import Finding
 from .base import AbstractVehicle, Layout
 from .checks import inputs_of
+from .initial import begun
 from .mechanism import Mechanism
 from .own import OwnModel
 from .products import derivatives
 from .submerged_body import CURRENT, SubmergedBody
 
+_FAR = 4.0  # standard deviations from an estimate by the geometry; published vehicles lie within three
 _TOLERANCE = 0.01  # of an inertia or a weight: such numbers are given to two or three digits
 
 
@@ -27,6 +29,7 @@ def vehicle_findings(vehicle: AbstractVehicle, where: str) -> tuple[Finding, ...
         found += _locked(vehicle, where)
         found += _twice(vehicle, where)
         found += _converted(vehicle, where)
+        found += _unlike_geometry(vehicle, where)
     if isinstance(vehicle, Mechanism):
         found += _couplings(vehicle, where)
     return (*found, *_idle(vehicle, where))
@@ -83,6 +86,26 @@ def _converted(body: SubmergedBody, where: str) -> Iterator[Finding]:
         if own:
             what = f"of {equation} in SI, from the {body.layout.system}: {', '.join(own)}"
             yield Finding("non-dimensional", "note", f"{where}: coefficients", what)
+
+
+def _unlike_geometry(body: SubmergedBody, where: str) -> Iterator[Finding]:
+    """Coefficients that lie far from what is estimated from the geometry that the file states."""
+    if body.layout.geometry is None:
+        return
+    file, values = begun(body.layout.geometry), body.own_values()
+    same = file.tables["model"]["coriolis"][0].strip('"') == body.coriolis
+    for name, estimate in file.coefficients.items():
+        term = derivative(name)
+        # what Coriolis forces hold is among products of two velocities, or not, as [model] says
+        if name not in values or term is None or not (same or term.rate or "|" in name):
+            continue
+        value = float(values[name])
+        off = abs(value - estimate.value) / estimate.std
+        if off > _FAR:
+            what = f"is {value:.4g} {term.unit}, {off:.1f} standard deviations from {estimate.value:.4g}"
+            what += f" ± {estimate.std:.2g}, the estimate by the geometry ({estimate.source})"
+            remedy = "check its sign and unit, or the dimensions of geometry"
+            yield Finding("geometry", "warning", f"{where}: coefficients.{name}", what, remedy)
 
 
 def _acts(name: str, layout: Layout) -> bool:

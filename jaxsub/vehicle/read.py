@@ -5,7 +5,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..effects import EQUATIONS, AbstractEffect, SmoothForce, derivative, parameter_table, vocabulary, with_numbers
+from ..effects import (
+    EQUATIONS,
+    STANDARD_DENSITY,
+    AbstractEffect,
+    SmoothForce,
+    derivative,
+    parameter_table,
+    vocabulary,
+    with_numbers,
+)
 from ..effects.base import option_fields
 from ..effects.derivatives import INPUT_UNITS
 from ..effects.motion import quantity_of
@@ -16,6 +25,7 @@ from .actuators import read_actuators
 from .assembly import BODY_KEYS, VECTORS, Vehicle, VehicleParts, build
 from .checks import check_count
 from .coefficient_units import coefficient_unit
+from .initial import read_geometry
 from .own import Model, channels_of, loaded
 from .scales import check_scaled, read_scales, scaled
 from .schema import Table, read_number, read_option, unknown_key
@@ -26,7 +36,7 @@ from .ties import Tie, read_entry
 from .toml import check_tree, read_toml
 
 _TOP = ("schema", "name", "kind", "dof", "class", "coefficients", "inputs", "environment", "outputs", "effects")
-_OF_BODY = ("body", "model", "prescribed", "actuators")
+_OF_BODY = ("body", "geometry", "model", "prescribed", "actuators")
 _SIZES = {"length": "m", "diameter": "m", "reference_density": "kg/m^3"}
 _MOST_EFFECTS = 100
 
@@ -94,6 +104,7 @@ def vehicle_from(
         dof=top.names("dof"),
         numbers=numbers,
         hull=extra,
+        geometry=read_geometry(top.table("geometry"), _sizes(body, extra)),
         model=model,
         coriolis=coriolis,
         attitude=attitude,
@@ -110,6 +121,13 @@ def vehicle_from(
         effect_rows=(*(row for _, row in devices.stages), *effect_rows),
     )
     return build(parts)
+
+
+def _sizes(body: dict[str, tuple[float, Parameter]], hull: dict[str, float]) -> dict[str, float]:
+    """What `[body]` says of sizes, by the names that a geometry has for them."""
+    known = {name: value for name, (value, _) in body.items()} | hull
+    named = {name: known[name] for name in ("mass", "speed", "length", "diameter") if name in known}
+    return named | {"density": known.get("reference_density", STANDARD_DENSITY)}
 
 
 def _refuse_others(top: Table, kind: str) -> None:

@@ -53,6 +53,9 @@ def vehicle_text(vehicle: AbstractVehicle, comment: str = "") -> str:
     said = lambda name: tied.get(name) or _number_table(own[name], rows.get(name), Parameter(name, free=False))
     if isinstance(vehicle, SubmergedBody):
         document["body"] = _body_table(vehicle, own, said)
+        if layout.geometry is not None:
+            kind, sizes = layout.geometry
+            document["geometry"] = {"kind": kind, **dict(sizes)}
         model = {"coriolis": vehicle.coriolis, "attitude": vehicle.attitude}
         usual = {"coriolis": CORIOLIS[0], "attitude": ATTITUDES[0]}
         if stated := {key: word for key, word in model.items() if word != usual[key]}:

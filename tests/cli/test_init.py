@@ -9,14 +9,14 @@ from commands import ran
 from jaxsub.cli.app import KINDS, PUBLISHED
 from jaxsub.cli.quantity import DIMENSIONS
 from jaxsub.recording import Recording, save
-from jaxsub.vehicle import initial, read_vehicle
+from jaxsub.vehicle import initial, like, read_vehicle
 
 AUV = ("--length", "1.33m", "--diameter", "19.1 cm", "--mass", "30.5")
 
 
 def test_kinds_and_dimensions_are_those_of_the_vehicles():
     assert set(KINDS) == initial.KINDS.keys()
-    assert PUBLISHED == initial.PUBLISHED
+    assert PUBLISHED == like.PUBLISHED
     assert {name.replace("-", "_"): unit for name, (unit, _) in DIMENSIONS.items()} == initial.SIZES
 
 

@@ -1,6 +1,7 @@
 """Vehicle files begun from dimensions: they read, move as vehicles do, and hold what is published of such vehicles."""
 
 import dataclasses
+import re
 import tomllib
 
 import jax.numpy as jnp
@@ -14,7 +15,7 @@ from jaxsub.estimate import fit
 from jaxsub.recording import Recording
 from jaxsub.simulation import integrate, synthetic
 from jaxsub.units import si_unit
-from jaxsub.vehicle import initial_file, vehicle_findings, vehicle_from
+from jaxsub.vehicle import initial_file, published_file, vehicle_findings, vehicle_from, vehicle_text
 
 # the REMUS 100, the Slocum, the BlueROV2 Heavy, the KVLCC2 as a 7 m model, the Otter
 SIZES = {
@@ -244,3 +245,31 @@ def test_any_dimensions_give_a_vehicle_that_is_damped(kind):
             "N_rdot",
         ]
         assert all(values[name] < 0.0 for name in own if name in values), (given, values)
+
+
+def test_coefficients_far_from_the_estimates_by_the_geometry_are_found():
+    """Claim: Prestero's Y_vv, N_rr and M_qq, ten times those of strips or more, are warned of, and no other of his."""
+    tree = tomllib.loads(published_file("remus-100")[0]) | {"geometry": {"kind": "auv"}}
+    tree["body"] |= {"length": 1.33, "diameter": 0.191}
+    vehicle = vehicle_from(tree, "remus")
+    assert vehicle_from(tomllib.loads(vehicle_text(vehicle)), "again").layout.geometry == vehicle.layout.geometry
+    found = {one.where: one for one in vehicle_findings(vehicle, "remus") if one.check == "geometry"}
+    assert set(found) == {f"remus: coefficients.{name}" for name in ("Y_v|v|", "N_r|r|", "M_q|q|")}
+    estimate = initial_file("auv", SIZES["auv"] | {"density": vehicle.density}).coefficients["Y_v|v|"]
+    off = (estimate.value + 1310.0) / estimate.std
+    assert f"is -1310 N/(m/s)/(m/s), {off:.1f} standard deviations" in found["remus: coefficients.Y_v|v|"].what
+
+
+@pytest.mark.parametrize(
+    ("geometry", "said"),
+    [
+        ({"kind": "auw"}, "geometry.kind: 'auw' is not known; did you mean auv?"),
+        ({"kind": "auv", "beam": 1.0}, "geometry.beam: unknown key; known: kind, length, mass, diameter"),
+        ({"kind": "auv", "diameter": 0.02}, "geometry.mass: is 30.5 kg, and a cylinder"),
+        ({"kind": "ship", "beam": 0.2}, "geometry.draught: is missing for a ship; give it in m"),
+    ],
+)
+def test_geometry_that_cannot_be_is_refused(geometry, said):
+    tree = tomllib.loads(initial_file("auv", SIZES["auv"]).text()) | {"geometry": geometry}
+    with pytest.raises(InputError, match=f"auv: {re.escape(said)}"):
+        vehicle_from(tree, "auv")

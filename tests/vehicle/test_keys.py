@@ -21,6 +21,7 @@ def trees():
     """Parsed vehicle files that together have every key the reader knows."""
     body, rig = tomllib.loads(BODY), tomllib.loads(RIG)
     body["body"] |= copy.deepcopy(EXTRA)
+    body["geometry"] = {"kind": "rov", "length": 2.0, "mass": 50.0, "beam": 0.5, "height": 0.4, "density": 1000.0}
     body["coefficients"]["X_u"] = copy.deepcopy(NUMBER)
     body["coefficients"]["M_q"] = {"value": -3.0, "free": False, "unit": "N*m/(rad/s)"}
     rig["coefficients"]["D_x"] = {"value": 1.0, "unit": "N s/m"}

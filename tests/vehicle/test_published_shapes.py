@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from jaxsub.recording import Recording
 from jaxsub.simulation import at_rest, prbs, simulate
 from jaxsub.vehicle import catalogue, published_file
-from jaxsub.vehicle.initial.like import PUBLISHED
+from jaxsub.vehicle.like import PUBLISHED
 
 FAST, SLOW = 0.004 * np.arange(101), 0.5 * np.arange(121)
 PITCH, ROLL = -0.4 * np.sin(0.1 * SLOW), 0.1 * np.cos(0.2 * SLOW)

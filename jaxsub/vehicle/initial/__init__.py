@@ -2,8 +2,16 @@
 
 from .file import InitialFile
 from .kinds import KINDS, initial_file
-from .like import PUBLISHED, published_file
 from .rig import rig_file
 from .sizes import SIZES
+from .stated import begun, read_geometry
 
-__all__ = ["KINDS", "PUBLISHED", "SIZES", "InitialFile", "initial_file", "published_file", "rig_file"]
+__all__ = [
+    "KINDS",
+    "SIZES",
+    "InitialFile",
+    "begun",
+    "initial_file",
+    "read_geometry",
+    "rig_file",
+]

@@ -37,6 +37,7 @@ class InitialFile:
     - `comments`: lines above all.
     - `coefficients`: by symbol.
     - `tables`: by section and key, TOML and a comment.
+    - `geometry`: that it is begun from, as TOML.
     - `unused`: columns of the log that nothing took.
     """
 
@@ -45,6 +46,7 @@ class InitialFile:
     comments: list[str] = dataclasses.field(default_factory=list)
     coefficients: dict[str, Estimate] = dataclasses.field(default_factory=dict)
     tables: dict[str, dict[str, tuple[str, str]]] = dataclasses.field(default_factory=dict)
+    geometry: str = ""
     unused: list[str] = dataclasses.field(default_factory=list)
 
     def put(self, section: str, key: str, value: str | float, comment: str = "") -> None:
@@ -64,6 +66,8 @@ class InitialFile:
         """The file."""
         lines = [f"# {comment}" for comment in self.comments]
         lines += ["schema = 1", f"name = {json.dumps(self.name)}", 'kind = "submerged-body"']
+        if self.geometry:
+            lines.append(f"geometry = {self.geometry}")
         if self.dof:
             lines.append(f"dof = {json.dumps(self.dof)}")
         order = ("body", "model", "coefficients", "inputs", "actuators", "outputs")

@@ -114,7 +114,7 @@ def _begun(name: str, sizes: Sizes, hull: Hull, residual: float) -> InitialFile:
     _add_clarke(file, sizes.density, hull)
     sway, yaw = crossflow_drag(sizes.density, hull.length, hull.draught, _CROSS)
     file.add(Estimate.within(0.5, -sway, f"strips, C_D = {_CROSS}"), "Y_v|v|")
-    file.add(Estimate.within(0.7, -yaw, "the same"), "N_r|r|")
+    file.add(Estimate.within(0.7, -yaw, "as Y_v|v|, in turning"), "N_r|r|")
     return file
 
 

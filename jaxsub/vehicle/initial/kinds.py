@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from ...recording import Recording
 from .auv import AUV, auv
 from .columns import Columns
-from .file import InitialFile
+from .file import InitialFile, number
 from .floating import SHIP, USV, ship, usv
 from .glider import GLIDER, glider
 from .rov import ROV, rov
@@ -32,6 +32,8 @@ def initial_file(kind: str, given: Mapping[str, float], log: Recording | None = 
     of, begin = KINDS[kind]
     file = begin(Sizes.of(of, given), Columns(log))
     said = ", ".join(f"{name.replace('_', ' ')} {value:g} {SIZES[name]}" for name, value in given.items())
+    stated = ", ".join([f'kind = "{kind}"', *(f"{name} = {number(value, 12)}" for name, value in given.items())])
+    file.geometry = f"{{ {stated} }}"
     file.comments = [
         f"Begun by `jaxsub init {kind}`: {said}.",
         "Every number is an estimate from these, with its standard deviation. The origin is the centre of gravity.",

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import tomlkit
 
-from ...errors import require_known
-from ...recording import Recording
-from ..read import vehicle_from
-from ..toml import read_toml
-from .columns import Columns
+from ..errors import require_known
+from ..recording import Recording
+from .initial.columns import Columns
+from .read import vehicle_from
+from .toml import read_toml
 
-_FOLDER = Path(__file__).parents[1] / "published"
+_FOLDER = Path(__file__).parent / "published"
 PUBLISHED = tuple(sorted(path.stem.replace("_", "-") for path in _FOLDER.glob("*.toml")))
 
 
