@@ -25,12 +25,10 @@ from ..arrays import aligned_zeros
 from ..estimate import estimate_disturbance
 from ..likelihood import Columns, Disturbance, padded_width, total_products
 from .columns import columns_of
-from .innovation_search import DISTURBANCE_STEPS, root_or_one
+from .innovation_search import root_or_one
 from .settings import DISTURBANCE_SHARES, MOST_COLUMNS
 from .view import Parts, View
 
-# rounds of scoring steps in which a disturbance is estimated
-_ROUNDS = 3
 # products that evidence begins with
 FIRST = len(DISTURBANCE_SHARES)
 
@@ -235,7 +233,7 @@ class Evidence:
         worth = np.where(filled, 1.0 / self.products[0].samples, 1.0)
         prior = np.asarray(block_diag(self.view.prior, np.diag(worth)))
         system, columns = self.view.followed.system, self.view.base + picked
-        found = estimate_disturbance(system, columns, prior, start, steps=DISTURBANCE_STEPS, rounds=_ROUNDS)
+        found = estimate_disturbance(system, columns, prior, start)
         return self.under(jax.tree.map(np.asarray, found))
 
     def left(self, chosen: Sequence[int], products: Products) -> Columns:

@@ -21,12 +21,12 @@ from .settings import PRIOR_WIDTH
 
 # dampings of a scoring step, of a column's squares, and shares of a change of the disturbance, tried in this order
 _DAMPINGS, _SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), (1.0, 0.5)
+# of what a search for the disturbance gained: to gain less is not worth a step before its columns change
+_SMALL = 0.01
 # alternations at most, and the change of the log likelihood below which they have converged
 _ALTERNATIONS, _CONVERGED = 8, 0.5
 # scoring steps at most under one disturbance, and the gain of the log likelihood below which they end
 _STEPS, _LEAST_GAIN = 30, 2.0
-# scoring steps of the disturbance in one program: enough for an alternation, after which its columns change
-DISTURBANCE_STEPS = 4
 # a gain of log likelihood that no step is worth
 _NEGLIGIBLE_GAIN = 0.1
 # information about a direction of the coefficients that the recordings do not identify, relative to one column's
@@ -167,7 +167,7 @@ class InnovationSearch:
 def _disturbances(iterate: Iterate) -> Iterator[Disturbance]:
     """The disturbance of largest restricted likelihood for the iterate's parameters, and one half as far."""
     system = iterate.followed.system
-    found = estimate_disturbance(system, iterate.base, iterate.prior, iterate.disturbance, steps=DISTURBANCE_STEPS)
+    found = estimate_disturbance(system, iterate.base, iterate.prior, iterate.disturbance, share=_SMALL)
     for share in _SHARES:
         towards = lambda old, new, share=share: old * (np.asarray(new) / old) ** share
         yield jax.tree.map(towards, iterate.disturbance, found)

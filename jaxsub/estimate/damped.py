@@ -16,6 +16,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
+from ..arrays import Values
 from .curvature import over_unit_diagonal
 from .problem import Expansion
 
@@ -34,22 +35,27 @@ class State(eqx.Module):
     promised: Float[Array, ""]
     damping: Float[Array, ""]
     growth: Float[Array, ""]
+    gained: Float[Array, ""]
     decrement: Float[Array, ""]
 
 
 class Damped(optx.AbstractMinimiser):
     r"""Minimises what `expand(args, y)` gives to second order; the function itself is not called.
 
-    Ends where the full step promises a gain below `tolerance`: $\tfrac12 g^TH^{-1}g$ is half the squared distance to
-    the optimum in standard errors, so 1e-5 stops within 0.005 of one, whatever the units. A trial that is not finite
-    is refused, so only a start that does not run ends as `nonfinite`; where no step however short is better the search
-    ends as `nonlinear_divergence`. An entry that presses on a bound, with less to gain on the way there than
-    `tolerance`, stays where it is until it is pulled back; what a bound stops short of its step is held there, and the
-    others' steps are for that.
+    Ends where the full step promises a gain below `tolerance`, or below a `share` of what was gained so far:
+    $\tfrac12 g^TH^{-1}g$ is half the squared distance to the optimum in standard errors, so 1e-5 stops within 0.005 of
+    one, whatever the units. A trial that is not finite is refused, so only a start that does not run ends as
+    `nonfinite`; where no step however short is better the search ends as `nonlinear_divergence`. An entry that presses
+    on a bound, with less to gain on the way there than `tolerance`, stays where it is until it is pulled back; what a
+    bound stops short of its step is held there, and the others' steps are for that.
     """
 
     expand: Callable[[Any, Array], Expansion] = eqx.field(static=True)
     tolerance: float = eqx.field(static=True)
+    # of what was gained so far: to gain less is not worth a step, where the search is one of several in alternation
+    share: Float[Values, ""] | float = 0.0
+    # the damping that it begins with, larger where curvature is that of an average
+    first: float = eqx.field(static=True, default=_FIRST)
     # largest change of an entry in one step
     longest: float = eqx.field(static=True, default=float("inf"))
     # of `args`: where from y a step leads, and how much of it, if there are bounds; else all of it, straight on
@@ -67,7 +73,7 @@ class Damped(optx.AbstractMinimiser):
         """As `init`, where expansions have the shapes of `like`."""
         # by NumPy, for which no program has to be made
         at = jax.tree.map(lambda part: np.zeros(part.shape, part.dtype), like)
-        numbers = [np.asarray(number, y.dtype) for number in (1.0, _FIRST, 2.0, np.inf)]
+        numbers = [np.asarray(number, y.dtype) for number in (1.0, self.first, 2.0, 0.0, np.inf)]
         fresh, at, *rest = jax.device_put((np.asarray(True), at, *numbers))
         return State(fresh, at, y, *rest)
 
@@ -94,7 +100,8 @@ class Damped(optx.AbstractMinimiser):
         # a start that does not run gives nothing to go by, and ends the search
         decrement = jnp.where(state.fresh & ~finite, jnp.nan, decrement)
         growth = chosen(2.0, 2.0 * state.growth)
-        return y, State(jnp.asarray(False), at, trial, promised, damping, growth, decrement)
+        gained = state.gained + jnp.where(good & ~state.fresh, state.at.cost - new.cost, 0.0)
+        return y, State(jnp.asarray(False), at, trial, promised, damping, growth, gained, decrement)
 
     def terminate(
         self, fn: Any, y: Array, args: Any, options: Any, state: State, tags: Any
@@ -102,7 +109,7 @@ class Damped(optx.AbstractMinimiser):
         """At the optimum; or stuck, where no step however short is better."""
         hopeless, stuck = jnp.isnan(state.decrement), state.damping > _MOST
         result = optx.RESULTS.where(stuck, optx.RESULTS.nonlinear_divergence, optx.RESULTS.successful)
-        done = (state.decrement <= self.tolerance) | stuck | hopeless
+        done = (state.decrement <= jnp.maximum(self.tolerance, self.share * state.gained)) | stuck | hopeless
         return done, optx.RESULTS.where(hopeless, optx.RESULTS.nonfinite, result)
 
     def postprocess(

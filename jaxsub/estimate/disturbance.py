@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..arrays import Values, namespace, quietly
 from ..likelihood import Averages, Columns, Disturbance, System, covariance_derivatives, restricted, total_products
@@ -23,9 +23,12 @@ from ..programs import compiled
 from .damped import Damped
 from .problem import Expansion
 
-_STEPS = 10
+# more than any search takes: what ends one is that nothing is left to gain
+_STEPS = 50
 # a gain of log likelihood that nothing depends on
 _ENOUGH = 0.1
+# damping that the search begins with: far from the optimum the average information is not its curvature
+_DAMPED = 1.0
 # standard deviations of weak priors on the logarithms of q, τ and κ: without them an absent force has no optimum
 _LOOSE = (5.0, 1.5, 2.0)
 # times the longest run, of a time constant: what changes more slowly is constant in a run, and would hide every effect
@@ -50,15 +53,14 @@ def estimate_disturbance(
     prior: Float[Values, "p1 p1"],
     start: Disturbance,
     *averages: Averages,
-    steps: int = _STEPS,
-    rounds: int = 1,
+    share: float = 0.0,
 ) -> Disturbance:
     """The disturbance of largest restricted likelihood, or a better one than `start` where that is far from it.
 
     `system` is the model of the runs, linearised. The first of the `columns` is the residual; `prior` as for
     `restricted`. `averages` of the same columns, of runs too long to be filtered sample by sample, are fitted beside
-    them. Priors hold it loosely to the `start`, and its time constants below half the longest run. It takes at most so
-    many `steps`, for which it is compiled, in each of so many `rounds`; in `jit` only one.
+    them. Priors hold it loosely to the `start`, and its time constants below half the longest run. The search ends
+    where less is left to gain than a `share` of what was gained, which serves one of several in alternation.
     """
     known = len(prior)
     whole = -(-known // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
@@ -68,20 +70,15 @@ def estimate_disturbance(
     one = xp.ones(())
     parts = [dataclasses.replace(part, columns=part.columns.padded(whole)) for part in averages]
     given = _Given((Averages(system, columns.padded(whole), one, one), *parts), filled, _logarithms(start))
-    found = start
-    for left in reversed(range(rounds)):
-        found, done = _search(given, found, steps)
-        if left and bool(done):
-            break
-    return found
+    return _search(given, start, xp.asarray(share))
 
 
 @compiled
-def _search(given: _Given, begin: Disturbance, steps: int) -> tuple[Disturbance, Bool[Array, ""]]:
-    """At most so many `steps` from `begin`, and whether they arrived."""
-    solver = Damped(_expand, _ENOUGH, _FARTHEST)
-    end = optx.minimise(_cost, solver, jnp.asarray(_logarithms(begin)), given, max_steps=steps, throw=False)
-    return _parts(given, end.value), end.result == optx.RESULTS.successful
+def _search(given: _Given, begin: Disturbance, share: Values) -> Disturbance:
+    """Where scoring from `begin` ends."""
+    solver = Damped(_expand, _ENOUGH, longest=_FARTHEST, share=share, first=_DAMPED)
+    end = optx.minimise(_cost, solver, jnp.asarray(_logarithms(begin)), given, max_steps=_STEPS, throw=False)
+    return _parts(given, end.value)
 
 
 def _logarithms(disturbance: Disturbance) -> Values:

@@ -37,6 +37,6 @@ def disturbance_along(
     found = Disturbance(force, np.full(n, _SLOW * usual), np.ones(len(sigma)))
     for _ in range(_ROUNDS):
         followed = filter_runs(vehicle, runs, noise, found, start, start_std)
-        found = estimate_disturbance(followed.system, followed.residual, np.zeros((1, 1)), found, rounds=2)
+        found = estimate_disturbance(followed.system, followed.residual, np.zeros((1, 1)), found)
         found = jax.tree.map(np.asarray, found)
     return found

@@ -20,10 +20,9 @@ ALLOWED = {
     },
     "is where a search for an optimum begins, how it is damped, or when it ends": {
         "innovation_search.py": {
-            "_DAMPINGS", "_SHARES", "_ALTERNATIONS", "_CONVERGED", "_STEPS", "_LEAST_GAIN", "_NEGLIGIBLE_GAIN",
-            "DISTURBANCE_STEPS",
+            "_DAMPINGS", "_SHARES", "_SMALL", "_ALTERNATIONS", "_CONVERGED", "_STEPS", "_LEAST_GAIN",
+            "_NEGLIGIBLE_GAIN",
         },
-        "evidence.py": {"_ROUNDS"},
         "tuned.py": {"_NEAR", "_STEPS"},
         "view.py": {"_DOUBTED", "_QUIET", "_LEAST_WHITE"},
     },
