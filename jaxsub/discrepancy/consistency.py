@@ -12,11 +12,14 @@ import numpy as np
 from jaxtyping import Float
 
 from ..estimate.assessment import Assessment, assess_residuals
+from ..likelihood import open_loop_variance
 from ..recording import Recording
+from .decisions import Decision
 from .diagnosis import ChannelQuality, Explained, Remainder
-from .settings import LARGE_ERROR, LISTED
+from .settings import BLOCKS, LARGE_ERROR, LISTED
 from .validation import stacked_columns
 from .verdict import Judged
+from .view import View
 
 
 def compared(
@@ -57,17 +60,46 @@ def assessed(
     return assess_residuals(tuple(columns), np.where(mask, whitened, 0.0), mask)
 
 
-def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder], assessment: Assessment) -> Judged:
-    """The verdict, unless it is `none` and the test runs' error is far above the noise: then `unknown`, and why.
+def expected_errors(view: View) -> dict[str, float]:
+    """By channel the rms/σ that noise and a view's disturbance leave in a simulation, from initial states that fit.
+
+    A force counts that changes within a block of a run (`BLOCKS`): what is slower is no more random in a run than
+    missing physics is.
+    """
+    system, disturbance = view.followed.system, view.disturbance
+    block = float(np.max(np.sum(np.asarray(system.intervals), axis=1))) / BLOCKS
+    random = np.where(np.asarray(disturbance.time) < block, disturbance.force, 0.0)
+    variance = open_loop_variance(dataclasses.replace(disturbance, force=random), system)
+    samples = np.maximum(np.sum(np.asarray(system.measured), axis=(0, 1)), 1)
+    rms = np.sqrt(1.0 + np.sum(np.asarray(variance), axis=(0, 1)) / samples)
+    return dict(zip(view.vehicle.layout.channels, rms.tolist(), strict=True))
+
+
+def consistent(
+    judged: Judged,
+    found: Explained,
+    remains: Mapping[str, Remainder],
+    expected: Mapping[str, float],
+    assessment: Assessment,
+) -> Judged:
+    """The verdict, unless it is `none` and the test runs' error is far above what is expected: then `unknown`, and why.
 
     `remains` is what the last model leaves of each channel there and `assessment` the tests of it, of which the one of
-    size then has the mismatch's p-value.
+    size then has the mismatch's p-value. `expected` is the rms/σ that noise and the model's disturbance leave.
     """
-    # the 95 % interval of a channel's error lies far above its noise, which no `none` may leave
-    far = {channel: rms for channel, rms in found.left.items() if remains[channel].low > LARGE_ERROR}
-    if judged.verdict != "none" or (found.improved_runs and not far):
+    if judged.verdict != "none":
         return judged
-    large = f"Simulation error on the test runs is {sigmas(far)}"
+    # the 95 % interval of a channel's error lies far above what is random, which no `none` may leave
+    over = {channel: remains[channel].low / expected[channel] for channel in found.left}
+    most = max(over.values(), default=0.0) if found.improved_runs else math.inf
+    test = "low end of the test error's interval over what noise and disturbance leave"
+    decision = Decision("mismatch", test, most, LARGE_ERROR, "large" if most > LARGE_ERROR else "not large")
+    judged = dataclasses.replace(judged, decisions=[*judged.decisions, decision])
+    if most <= LARGE_ERROR:
+        random = {channel: expected[channel] for channel in found.left if remains[channel].low > LARGE_ERROR}
+        note = f"Random disturbance forces and noise alone leave {sigmas(random)} in a simulation."
+        return dataclasses.replace(judged, notes=[*judged.notes, note]) if random else judged
+    large = f"Simulation error on the test runs is {sigmas({c: found.left[c] for c in over if over[c] > LARGE_ERROR})}"
     why = large if found.improved_runs else "The model diverges on the test runs"
     note = f"{why}, although no missing effect is significant: the verdict is unknown and not none."
     p_value = judged.p_value if assessment.size is None else min(judged.p_value, assessment.size)

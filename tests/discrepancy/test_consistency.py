@@ -20,6 +20,8 @@ from jaxsub.recording import Recording
 
 SIGMA = np.array([0.5, 2.0])
 CHANNELS = ("v", "psi")
+# what noise alone leaves
+STILL = dict.fromkeys(CHANNELS, 1.0)
 quick = settings(derandomize=True, deadline=None, max_examples=60)
 sizes = st.floats(0.9, 20.0)
 
@@ -58,7 +60,7 @@ def explained(before, after, noise=None):
 def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
     """Claim: with any channel's interval above 2 σ the verdict is unknown, with the reason; else it is left alone."""
     found, remains, assessment = explained((v, psi), (v, psi))
-    judged = consistent(Judged("none", [], p_value, ["said"]), found, remains, assessment)
+    judged = consistent(Judged("none", [], p_value, ["said"]), found, remains, STILL, assessment)
     far = [c for c in CHANNELS if remains[c].low > LARGE_ERROR]
     assert judged.verdict == ("unknown" if far else "none")
     assert judged.notes[0] == "said" and judged.p_value == (min(p_value, assessment.size) if far else p_value)
@@ -73,7 +75,22 @@ def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
 def test_other_verdicts_are_left_alone(verdict):
     found, remains, assessment = explained((9.0, 9.0), (9.0, 9.0))
     judged = Judged(verdict, [], 1e-9, [])
-    assert consistent(judged, found, remains, assessment) is judged
+    assert consistent(judged, found, remains, STILL, assessment) is judged
+
+
+@quick
+@given(v=sizes, psi=sizes, random=sizes)
+def test_an_error_as_large_as_random_forces_make_it_is_no_mismatch(v, psi, random):
+    """Claim: of a channel that random forces move, twice what they leave is far above it; what they leave is told."""
+    found, remains, assessment = explained((v, psi), (v, psi))
+    expected = {"v": 1.0, "psi": random}
+    judged = consistent(Judged("none", [], 1.0, []), found, remains, expected, assessment)
+    far = [c for c in CHANNELS if remains[c].low > LARGE_ERROR * expected[c]]
+    assert judged.verdict == ("unknown" if far else "none")
+    assert judged.decisions[-1].outcome == ("large" if far else "not large")
+    told = not far and remains["psi"].low > LARGE_ERROR
+    assert bool(judged.notes) == bool(far or told)
+    assert not told or f"{random:.3g} σ in psi" in judged.notes[-1]
 
 
 def test_a_model_that_diverges_on_the_test_run_is_not_none():
@@ -83,7 +100,7 @@ def test_a_model_that_diverges_on_the_test_run_is_not_none():
     lost = dict.fromkeys(CHANNELS, math.nan)
     found = compared(lost, lost, {c: remainder(math.nan) for c in CHANNELS}, quality(), wild)
     assert found == Explained(None, {}, False, False)
-    judged = consistent(Judged("none", [], 1.0, []), found, {c: remainder(math.nan) for c in CHANNELS}, wild)
+    judged = consistent(Judged("none", [], 1.0, []), found, {c: remainder(math.nan) for c in CHANNELS}, STILL, wild)
     assert judged.verdict == "unknown" and "diverges" in judged.notes[-1]
     assert "diverges" in summary("unknown", [], [], [], found, 1.0)
 

@@ -6,15 +6,21 @@ import math
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import scipy.signal
 from diagnosis_cases import recorded, wrong
 from rigs import driven, oscillator
 
 from jaxsub.discrepancy import innovation_search, view
-from jaxsub.discrepancy.evidence import evidence_of
+from jaxsub.discrepancy.columns import columns_of
+from jaxsub.discrepancy.consistency import expected_errors
+from jaxsub.discrepancy.evidence import Evidence, evidence_of
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.estimate import batch, fit
-from jaxsub.simulation import synthetic
+from jaxsub.likelihood import Disturbance, whitened
+from jaxsub.likelihood.whiteness import portmanteau
+from jaxsub.recording import Recording
+from jaxsub.simulation import prbs, synthetic
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +59,55 @@ def test_runs_of_unequal_length_have_a_disturbance(fitted):
     # it moved from where it began
     begun = view._guessed(fitted.model.whole, fitted.runs, fitted.sigma, fitted.problem.start_std)
     assert np.max(np.abs(np.log(found.disturbance.force / np.asarray(begun.force)))) > 0.1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_random_force_far_above_the_noise_is_found(seed):
+    """Claim: by innovations of an oscillator pushed about at random, by SciPy: time constant, size, and they are white.
+
+    In simulation they are several σ off, and where the search for the force begins the first steps lead nowhere.
+    """
+    rng, times, size, slow = np.random.default_rng(seed), 0.2 * np.arange(600), 0.08, 3.0
+    fade = math.exp(-0.2 / slow)
+    system = scipy.signal.StateSpace([[0.0, 1.0], [-4.0, -0.6]], [[0.0], [1.0]], np.eye(2), np.zeros((2, 1)))
+    runs = []
+    for i in range(2):
+        drive = prbs(len(times), 15, 0.1, 10 * seed + i)
+        force = scipy.signal.lfilter([math.sqrt(1.0 - fade**2)], [1.0, -fade], size * rng.standard_normal(len(times)))
+        shown = scipy.signal.lsim(system, 2.0 * drive, times, interp=False)[1]
+        shown = shown + scipy.signal.lsim(system, force, times)[1] + rng.standard_normal(shown.shape) * [0.01, 0.02]
+        runs.append(Recording(f"run {i}", times, {"f": drive, "x": shown[:, 0], "x_rate": shown[:, 1]}, "test"))
+    found = fit(oscillator(), batch(oscillator(), runs).padded())
+    assert max(found.rms.values()) > 2.0
+    seen = look(found)
+    assert 0.5 < float(seen.disturbance.time[0]) / slow < 2.0
+    assert 0.7 < float(seen.disturbance.force[0]) / size < 1.4
+    evidence = Evidence.of(seen, columns_of(seen, []), [seen.disturbance])
+    white, _ = whitened(seen.disturbance, seen.followed.system, evidence.left([], evidence.products[0]))
+    assert portmanteau(np.asarray(white)[..., 0], np.asarray(seen.followed.system.measured)) > 1e-3
+
+
+def test_what_is_random_is_as_large_as_many_simulations_are_off():
+    """Claim: of an oscillator pushed about at random; forces slower than a block of a run count as none."""
+    times, rng = 0.2 * np.arange(600), np.random.default_rng(5)
+    runs = synthetic(oscillator(), [driven(oscillator(), times, seed=i) for i in range(2)], seed=1)
+    seen = look(fit(oscillator(), batch(oscillator(), runs).padded()))
+    size, slow = 0.1, 2.0
+    pushed = lambda time: dataclasses.replace(
+        seen, disturbance=Disturbance(np.array([size]), np.array([time]), np.ones(2))
+    )
+    fade = math.exp(-0.2 / slow)
+    white = size * rng.standard_normal((200, len(times)))
+    white[:, 1:] *= math.sqrt(1.0 - fade**2)
+    force = scipy.signal.lfilter([1.0], [1.0, -fade], white)
+    values = {name: float(value) for name, value in seen.vehicle.values().items()}
+    system = scipy.signal.StateSpace(
+        [[0.0, 1.0], [-values["K_x"], -values["D_x"]]], [[0.0], [1.0]], np.eye(2), np.zeros((2, 1))
+    )
+    off = np.stack([scipy.signal.lsim(system, one, times)[1] for one in force])
+    rms = np.sqrt(1.0 + np.mean((off / [0.01, 0.02]) ** 2, axis=(0, 1)))
+    np.testing.assert_allclose([*expected_errors(pushed(slow)).values()], rms, rtol=0.05)
+    assert [*expected_errors(pushed(30.0)).values()] == [1.0, 1.0]
 
 
 def test_searches_that_agree_are_one():
