@@ -50,8 +50,8 @@ def trim(
     """The steady motion of `plant` in which channels and inputs have the values `wanted`, SI, at `time` in s.
 
     Each input needs a condition. While there are fewer, a body is wanted level (`depth_rate` zero, unless there is a
-    `theta`), straight (`heading_rate`, unless there is an `r`) and upright (`phi`), in that order. `at` gives its place
-    (m) and heading (rad), elsewhere zero.
+    `theta`), straight (`heading_rate`, unless there is an `r`) and upright (`phi`), in that order. Of a mechanism or a
+    model nothing wanted means inputs of zero. `at` gives a body's place (m) and heading (rad), elsewhere zero.
 
     **Raises** `InputError` for a name that is unknown and for a number of conditions that does not fit.
     """
@@ -104,13 +104,15 @@ def require_trim(plant: Plant, found: Trim, tolerance: float = 1e-6) -> Trim:
 def _conditions(
     plant: Plant, wanted: Mapping[str, Float[Array, ""] | float], at: Mapping[str, Float[Array, ""] | float]
 ) -> tuple[dict[str, Array | float], Mapping[str, Array | float]]:
-    """What is wanted, with straight and level flight where nothing else is said; as many as it takes."""
+    """What is wanted, with straight and level flight, or inputs of zero, where nothing is said; as many as it takes."""
     layout = plant.vehicle.layout
     body = layout.kind == "submerged-body"
     full: dict[str, Array | float] = dict(wanted)
     for name, instead, position in _LEVEL if body else ():
         if len(full) < len(plant.inputs) and layout.tells(position) and instead not in full:
             full.setdefault(name, 0.0)
+    if not body and not full:
+        full = dict.fromkeys(plant.inputs, 0.0)
     short = len(plant.inputs) - len(full)
     require_known("trim: wanted", full, (*producible(plant.vehicle), *plant.inputs), layout.name)
     require_known("trim: at", at, [name for name in plant.states if _is_place(plant, name)], layout.name)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 from ..effects.motion import PROPULSION
 from ..errors import InputError, require_known
 from ..information.design_limits import producible
-from .equilibrium import require_trim, trim
+from .equilibrium import Trim, require_trim, trim
 from .limits import FinLimits
 from .mpc_problem import Task, Weights
 from .plant import Plant
@@ -79,6 +79,7 @@ class Mpc(eqx.Module):
         within: Mapping[str, tuple[float, float]] | None = None,
         *,
         limits: FinLimits | Mapping[str, FinLimits] | None = None,
+        rest: Trim | None = None,
         horizon: float = 15.0,
         free: int = 8,
         effort: float = 0.5,
@@ -93,8 +94,9 @@ class Mpc(eqx.Module):
         `psi`, those that the plant has. `within` bounds channels, SI; one that passes its bound by the root of `give`,
         in parts of half the range, costs ½ a sample. `limits` are those of every fin, by default `FinLimits.of()`, or
         one for each input by name; `effort` and `pace` the parts of amplitude and rate that cost one for a second.
-        Inputs are `free` at as many samples, closer together at first, and rest where the plant is in trim. A
-        sample takes at most `steps` steps of the solver, which ends where one promises less than `tolerance` of 1 + J.
+        Inputs are `free` at as many samples, closer together at first. They rest, at no cost, where the plant is in the
+        trim `rest`, by default that of `trim` with nothing wanted. A sample takes at most `steps` steps of the solver,
+        which ends where one promises less than `tolerance` of 1 + J.
 
         **Raises** `InputError` for a channel that the vehicle has not, an empty range, an input without finite limits,
         and a plant without trim.
@@ -111,7 +113,8 @@ class Mpc(eqx.Module):
         amplitude, rate = _limits(plant, limits)
         columns = lambda values: jnp.asarray(list(values), plant.constants.dtype)
         weights = Weights(
-            tuple(track), columns(track.values()), effort * amplitude, pace * rate, require_trim(plant, trim(plant)).u,
+            tuple(track), columns(track.values()), effort * amplitude, pace * rate,
+            require_trim(plant, trim(plant) if rest is None else rest).u,
             amplitude, rate, tuple(within), columns(low for low, _ in within.values()),
             columns(high for _, high in within.values()), columns([give])[0],
             tuple(layout.is_angle(name) for name in track),

@@ -42,6 +42,8 @@ def published_file(name: str, log: Recording | None = None) -> tuple[str, list[s
     outputs = tomlkit.table()
     for channel, sigma in columns.outputs(layout.channels):
         outputs.add(tomlkit.key([channel, "sigma"]), tomlkit.value(sigma))
+    # behind all else: a published file may have them in one line above its tables
+    del file["outputs"]
     file["outputs"] = outputs
     said = [f"# Not used of the log: {columns.said_of_left}.\n"] if columns.left else []
     said += [f"# Not in the log: {', '.join(missing)}. Name their columns under [inputs].\n"] if missing else []

@@ -179,9 +179,8 @@ def test_its_own_log_is_taken_and_checked_without_a_warning(kind):
     assert [one.line() for one in findings if one.severity != "note"] == []
 
 
-@pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=[pytest.mark.long] if kind != "usv" else []) for kind in SIZES]
-)
+@pytest.mark.long  # the guide to begun files fits the catamaran
+@pytest.mark.parametrize("kind", SIZES)
 def test_a_fit_of_its_own_log_ends_near_the_truth(kind):
     """Claim: begun half a standard deviation off, it ends within four of its standard errors."""
     made, true = driven_run(kind), begun(kind).values()
