@@ -55,7 +55,7 @@ def test_estimator_ends_at_the_optimum(problem, best, name):
     assert np.abs(start[0] - best.y[0]).max() > 0.05, "the start was meant to be away"
 
 
-@pytest.mark.parametrize("name", ["ekf", "mekf"])
+@pytest.mark.parametrize("name", ["ekf", pytest.param("mekf", marks=pytest.mark.long)])
 def test_filter_ends_nearer_than_it_began_and_says_nothing_of_an_optimum(problem, best, name):
     starts = scattered(problem, 0.5, 6, seed=5)
     found = METHODS[name]().run(problem, starts)

@@ -28,7 +28,10 @@ def test_every_case_has_a_name_of_its_own_and_conceals_what_the_vocabulary_names
     assert all(not (case.truth and case.factors) for case in plan.CASES)
 
 
-@pytest.mark.parametrize(("case", "actuator"), [("rov-weak-thruster", "t2"), ("otter-weak-thruster", "right")])
+@pytest.mark.parametrize(
+    ("case", "actuator"),
+    [pytest.param("rov-weak-thruster", "t2", marks=pytest.mark.long), ("otter-weak-thruster", "right")],
+)
 def test_weak_thruster_in_the_generator_s_words_is_the_vehicle_with_that_gain(case, actuator):
     """Claim: the same motions to 1e-9 as the catalogue's vehicle with `gain = 0.8` on that thruster."""
     case = CASES[case]

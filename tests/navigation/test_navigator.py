@@ -111,6 +111,7 @@ def test_the_navigator_finds_attitude_bias_and_position(kind):
     np.testing.assert_allclose(last.position.filter.x, ahead, atol=1.5)
 
 
+@pytest.mark.long
 def test_the_navigator_in_flight_and_off_line_says_the_same():
     system, readings = navigator(), flight()
     state = navigator_start(system, readings)

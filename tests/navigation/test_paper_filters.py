@@ -22,6 +22,8 @@ from jaxsub.navigation.position import Course, DeadReckoning
 EMPTY = jnp.zeros(0), jnp.zeros((0, 0))
 ANGLE_STD = np.radians([1.0, 1.5, 2.0])
 BIAS = np.radians([2.0, -1.0, 1.5])
+# where both attitudes would say the same, the second is asked when run long
+ATTITUDES = [(PaperAttitude(), 7), pytest.param(RotationAttitude(), 6, marks=pytest.mark.long)]
 
 
 def omega(w):
@@ -192,7 +194,7 @@ def test_noise_in_every_direction_keeps_the_covariance_positive_definite(rule, f
     assert np.sqrt(np.mean(error**2)) < np.radians(6.0)
 
 
-@pytest.mark.parametrize(("process", "ways"), [(PaperAttitude(), 7), (RotationAttitude(), 6)])
+@pytest.mark.parametrize(("process", "ways"), ATTITUDES)
 def test_the_gyros_bias_is_found(process, ways):
     rate, _, angles, measured = flight(1600, 0.05, every=20)
     noise = ConstantNoise(jnp.diag(jnp.array([3e-3] * (ways - 3) + [1e-5] * 3)))
@@ -205,7 +207,7 @@ def test_the_gyros_bias_is_found(process, ways):
     assert (std < np.radians(0.3)).all()
 
 
-@pytest.mark.parametrize(("process", "ways"), [(PaperAttitude(), 7), (RotationAttitude(), 6)])
+@pytest.mark.parametrize(("process", "ways"), ATTITUDES)
 def test_three_time_updates_then_one_measurement_are_three_and_one(process, ways):
     """A measurement at the fourth step, after no more time, is that of a sample which has both."""
     rate, _, angles, measured = flight(30, 1 / 3, every=3)
@@ -331,7 +333,7 @@ def test_the_position_filter_is_the_papers():
         np.testing.assert_allclose(joints[k] @ joints[k].T, P, rtol=1e-11, atol=1e-10)
 
 
-@pytest.mark.parametrize(("process", "ways"), [(PaperAttitude(), 7), (RotationAttitude(), 6)])
+@pytest.mark.parametrize(("process", "ways"), ATTITUDES)
 def test_float32_stays_float32_and_close(process, ways):
     rate, _, angles, measured = flight(200, 0.05)
     filter = paper_filter(process=process, ways=ways)

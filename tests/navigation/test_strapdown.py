@@ -153,7 +153,7 @@ def hovering(count, mask):
     return true, bias, Sample(inputs, elapsed, jnp.zeros((count, 7)), jnp.asarray(mask))
 
 
-@pytest.mark.parametrize("rule", ["constant", "fuzzy"])
+@pytest.mark.parametrize("rule", [pytest.param("constant", marks=pytest.mark.long), "fuzzy"])
 def test_on_line_it_is_the_same_as_off_line_and_finds_attitude_and_bias(rule):
     least = jnp.repeat(jnp.array([0.0, 0.0, 0.0, 1e-5, 1e-4]), 3)
     noise = FuzzyNoise(least, 100.0 * least, width=5) if rule == "fuzzy" else None
@@ -173,7 +173,16 @@ def test_on_line_it_is_the_same_as_off_line_and_finds_attitude_and_bias(rule):
     np.testing.assert_allclose(estimate.x_std, estimates.x_std[59], atol=1e-12)
 
 
-@pytest.mark.parametrize("case", ["no quaternion", "free fall", "nose up", "no field", "minutes without a fix"])
+@pytest.mark.parametrize(
+    "case",
+    [
+        "no quaternion",
+        "free fall",
+        "nose up",
+        "no field",
+        pytest.param("minutes without a fix", marks=pytest.mark.long),
+    ],
+)
 def test_nothing_ceases_to_be_finite(case):
     count = 2400 if case == "minutes without a fix" else 20
     mask = np.tile(np.array([True] * 3 + [False] * 3 + [True]), (count, 1))
