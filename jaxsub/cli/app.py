@@ -279,7 +279,7 @@ def init(
 @_overwrite
 @common
 def import_(file: Path, out: Path, overwrite: bool) -> None:
-    """Write a Gazebo model (SDF) as a vehicle file, and name what of it is not translated."""
+    """Write a Gazebo model (SDF) or MSS matrices (.mat) as a vehicle file, and name what of it is not translated."""
     from . import simulators as command
 
     command.run_import(file, out, overwrite)

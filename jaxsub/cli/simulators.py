@@ -3,16 +3,16 @@
 from pathlib import Path
 
 from ..errors import InputError
-from ..vehicle import SubmergedBody, read_sdf, read_vehicle, sdf_text, vehicle_text
+from ..vehicle import SubmergedBody, read_mss, read_sdf, read_vehicle, sdf_text, vehicle_text
 from . import session, terminal
 from .output import fresh_file
 
 
 def run_import(path: Path, out: Path, overwrite: bool) -> None:
-    """Write the vehicle of the SDF file at `path` to `out`, and name what of the model it lacks."""
+    """Write the vehicle of the SDF or MATLAB file at `path` to `out`, and name what of the model it lacks."""
     session.start()
     with fresh_file(out, overwrite, [path]) as new:
-        vehicle, lost = read_sdf(path)
+        vehicle, lost = (read_mss if path.suffix == ".mat" else read_sdf)(path)
         said = [f"From {path.name}, by jaxsub import.", *(f"Not translated: {one}." for one in lost)]
         new.write_text(vehicle_text(vehicle, "\n".join(said)), encoding="utf-8")
     _emit(out, lost)

@@ -28,11 +28,9 @@ def read_matlab(path: Path, source: str) -> Contents:
 
     A field or variable `units`, itself a struct, may state the unit of each array: `units.r = 'deg/s'`.
     """
-    optional("pymatreader", "files", source)
     with reading(source, "a MATLAB file"):
-        _check(path, source)
-        found = read_variables(path, _COPIES * most(path.stat().st_size))
-        tables = dict(_tables({name: value for name, value in found.items() if not name.startswith("__")}))
+        found = read_structs(path, source)
+        tables = dict(_tables(found))
         if len(tables) > 1:
             listed = ", ".join(name or "the file itself" for name in tables)
             raise InputError(
@@ -41,6 +39,15 @@ def read_matlab(path: Path, source: str) -> Contents:
         place, values = next(iter(tables.items()), ("", found))
         notes = [note(source, "dialect", f"is read from the struct {place}")] if place else []
         return Contents(_columns(source, values), tuple(notes))
+
+
+def read_structs(path: Path, source: str) -> dict[str, Any]:
+    """The variables of a MATLAB file by name, structs as dictionaries."""
+    optional("pymatreader", "files", source)
+    with reading(source, "a MATLAB file"):
+        _check(path, source)
+        found = read_variables(path, _COPIES * most(path.stat().st_size))
+    return {name: value for name, value in found.items() if not name.startswith("__")}
 
 
 def _check(path: Path, source: str) -> None:

@@ -10,6 +10,7 @@ from .gazebo import read_sdf, sdf_text
 from .initial import InitialFile, initial_file, rig_file
 from .like import published_file
 from .mechanism import Mechanism
+from .mss import read_mss
 from .oddities import vehicle_findings
 from .own import Model, OwnModel
 from .read import read_vehicle, vehicle_from
@@ -35,6 +36,7 @@ __all__ = [
     "own_model",
     "published_file",
     "quantities_of",
+    "read_mss",
     "read_sdf",
     "read_vehicle",
     "recorded_columns",
