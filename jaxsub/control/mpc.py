@@ -98,12 +98,14 @@ class Mpc(eqx.Module):
         trim `rest`, by default that of `trim` with nothing wanted. A sample takes at most `steps` steps of the solver,
         which ends where one promises less than `tolerance` of 1 + J.
 
-        **Raises** `InputError` for a channel that the vehicle has not, an empty range, an input without finite limits,
-        and a plant without trim.
+        **Raises** `InputError` for no channel or one that the vehicle has not, an empty range, an input without finite
+        limits, and a plant without trim.
         """
         layout = plant.vehicle.layout
         track = {n: _SCALE[n] for n in ("z", "psi") if layout.tells(n)} if track is None else track
         within = {} if within is None else within
+        if not track:
+            raise InputError("mpc: track", "names no channel", 'give { "speed": 0.1 } and the like')
         require_known("mpc: channel", (*track, *within), producible(plant.vehicle), layout.name)
         for name, (low, high) in within.items():
             if not low < high:

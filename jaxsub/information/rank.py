@@ -14,7 +14,7 @@ from .excitation import Excitation
 from .tied import tied_numbers
 
 # what is said of a number that follows from coefficients that leave it open
-FOLLOWS = "left open by what it follows"
+FOLLOWS = "left open by its expression"
 _SHOWN, _PARTNERS, _SHARE, _NAMED = 0.15, 5, 0.2, 3
 Kind = Literal[
     "identified",
@@ -24,7 +24,7 @@ Kind = Literal[
     "at its upper bound",
     "not converged",
     "fit does not explain the runs",
-    "left open by what it follows",
+    "left open by its expression",
 ]
 # what is said once of all coefficients and not of each
 _OF_ALL = {
@@ -180,7 +180,7 @@ def _tied_verdicts(fit: Solution, directions: Directions) -> Iterator[Coefficien
         if relative <= FRACTION:
             yield CoefficientVerdict(tied.name, "identified", relative, tied.ends)
         else:
-            remedy = f"identify {' and '.join(tied.ends)}, or measure what {tied.name} makes"
+            remedy = f"it needs {' and '.join(tied.ends)} to smaller errors, or another expression"
             yield CoefficientVerdict(tied.name, FOLLOWS, relative, tied.ends, remedy=remedy)
 
 

@@ -50,8 +50,8 @@ def test_equation_that_may_be_multiplied_leaves_one_direction_open_and_says_so(s
 
 def test_number_that_follows_from_an_open_one_is_open(scaled):
     (tied,) = identifiability(scaled).tied
-    assert (tied.name, tied.kind, tied.partners) == ("F_x", "left open by what it follows", ("K_x",))
-    assert tied.relative_error == np.inf and tied.remedy.startswith("identify K_x")
+    assert (tied.name, tied.kind, tied.partners) == ("F_x", "left open by its expression", ("K_x",))
+    assert tied.relative_error == np.inf and tied.remedy.startswith("it needs K_x to smaller errors")
     assert {e.name: e.standard_error for e in estimates(scaled, identifiability(scaled), None)}["F_x"] is None
 
 

@@ -12,6 +12,7 @@ from test_own_models import CASES, Tank, driven
 import jaxsub as js
 from jaxsub.control import FinLimits
 from jaxsub.effects import ActuatorLag
+from jaxsub.errors import InputError
 from jaxsub.vehicle import AbstractVehicle
 
 
@@ -41,6 +42,8 @@ def test_a_motor_is_brought_to_a_speed_at_its_trim():
     assert float(js.trim(plant).u[0]) == pytest.approx(0.0, abs=1e-9)  # where nothing is wanted
     limits = {"voltage": FinLimits.of(12.0, 1e3)}
     mpc = js.Mpc.of(plant, {"speed": 0.1}, limits=limits, rest=at, horizon=0.4, free=4)
+    with pytest.raises(InputError, match="mpc: track: names no channel"):
+        js.Mpc.of(plant, limits=limits, rest=at)
     reference = jnp.full((mpc.samples, 1), 10.0)
 
     def sample(carry, _):
