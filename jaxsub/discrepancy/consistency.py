@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..estimate.assessment import Assessment, assess_residuals
-from ..likelihood import open_loop_variance
+from ..likelihood import open_loop_errors
 from ..recording import Recording
 from .decisions import Decision
 from .diagnosis import ChannelQuality, Explained, Remainder
@@ -21,18 +21,22 @@ from .validation import stacked_columns
 from .verdict import Judged
 from .view import View
 
+# simulations with random forces, of every run
+_DRAWS, _SEED = 32, 0
+
 
 def compared(
     before: Mapping[str, float],
     after: Mapping[str, float],
     baseline: Mapping[str, Remainder],
     quality: Sequence[ChannelQuality],
+    expected: Mapping[str, float],
     assessment: Assessment,
 ) -> Explained:
     """What the improved model removes of the baseline's excess variance on the test runs, and what it leaves.
 
-    `before` and `after` are rms/σ of the two models there by channel, `baseline` is what the first one leaves, and
-    `assessment` has the tests of what the second one leaves.
+    `before` and `after` are rms/σ of the two models there by channel, `baseline` is what the first one leaves,
+    `expected` the `expected_errors` of the second, and `assessment` has the tests of what it leaves.
     """
     floor = {one.channel: (one.record_sigma / one.sigma) ** 2 if one.sigma_estimated else 1.0 for one in quality}
     excess = lambda rms: sum(max(value**2 - floor[channel], 0.0) for channel, value in rms.items())
@@ -41,7 +45,7 @@ def compared(
     significant = any(one.low**2 > floor[channel] for channel, one in baseline.items())
     share = 1.0 - excess(after) / excess(before) if runs and assessment.runs_model and significant else None
     left = {one.channel: after[one.channel] for one in assessment.oversized}
-    return Explained(share, left, runs, assessment.runs_model)
+    return Explained(share, left, runs, assessment.runs_model, {channel: expected[channel] for channel in left})
 
 
 def assessed(
@@ -61,7 +65,7 @@ def assessed(
 
 
 def expected_errors(view: View) -> dict[str, float]:
-    """By channel the rms/σ that noise and a view's disturbance leave in a simulation, from initial states that fit.
+    """By channel the rms/σ that noise and a view's disturbance leave in a simulation, its initial states fitted.
 
     A force counts that changes within a block of a run (`BLOCKS`): what is slower is no more random in a run than
     missing physics is.
@@ -69,36 +73,30 @@ def expected_errors(view: View) -> dict[str, float]:
     system, disturbance = view.followed.system, view.disturbance
     block = float(np.max(np.sum(np.asarray(system.intervals), axis=1))) / BLOCKS
     random = np.where(np.asarray(disturbance.time) < block, disturbance.force, 0.0)
-    variance = open_loop_variance(dataclasses.replace(disturbance, force=random), system)
-    samples = np.maximum(np.sum(np.asarray(system.measured), axis=(0, 1)), 1)
-    rms = np.sqrt(1.0 + np.sum(np.asarray(variance), axis=(0, 1)) / samples)
+    measured = np.asarray(system.measured)
+    draws = np.random.default_rng(_SEED).standard_normal((*measured.shape[:2], len(random), _DRAWS))
+    errors = open_loop_errors(dataclasses.replace(disturbance, force=random), system, draws)
+    samples = np.maximum(np.sum(measured, axis=(0, 1)), 1)
+    rms = np.sqrt(1.0 + np.sum(np.mean(errors**2, axis=-1), axis=(0, 1)) / samples)
     return dict(zip(view.vehicle.layout.channels, rms.tolist(), strict=True))
 
 
-def consistent(
-    judged: Judged,
-    found: Explained,
-    remains: Mapping[str, Remainder],
-    expected: Mapping[str, float],
-    assessment: Assessment,
-) -> Judged:
-    """The verdict, unless it is `none` and the test runs' error is far above what is expected: then `unknown`, and why.
+def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder], assessment: Assessment) -> Judged:
+    """The verdict, unless it is `none` and the test runs' error is far above what is random: then `unknown`, and why.
 
     `remains` is what the last model leaves of each channel there and `assessment` the tests of it, of which the one of
-    size then has the mismatch's p-value. `expected` is the rms/σ that noise and the model's disturbance leave.
+    size then has the mismatch's p-value.
     """
     if judged.verdict != "none":
         return judged
     # the 95 % interval of a channel's error lies far above what is random, which no `none` may leave
-    over = {channel: remains[channel].low / expected[channel] for channel in found.left}
+    over = {channel: remains[channel].low / found.random[channel] for channel in found.left}
     most = max(over.values(), default=0.0) if found.improved_runs else math.inf
     test = "low end of the test error's interval over what noise and disturbance leave"
     decision = Decision("mismatch", test, most, LARGE_ERROR, "large" if most > LARGE_ERROR else "not large")
     judged = dataclasses.replace(judged, decisions=[*judged.decisions, decision])
     if most <= LARGE_ERROR:
-        random = {channel: expected[channel] for channel in found.left if remains[channel].low > LARGE_ERROR}
-        note = f"Random disturbance forces and noise alone leave {sigmas(random)} in a simulation."
-        return dataclasses.replace(judged, notes=[*judged.notes, note]) if random else judged
+        return judged
     large = f"Simulation error on the test runs is {sigmas({c: found.left[c] for c in over if over[c] > LARGE_ERROR})}"
     why = large if found.improved_runs else "The model diverges on the test runs"
     note = f"{why}, although no missing effect is significant: the verdict is unknown and not none."

@@ -185,7 +185,8 @@ class Explained:
 
     - `share`: of the baseline's excess variance over the noise, what the improved model removes; None where the
       baseline leaves no significant excess, or one of the two diverges.
-    - `left`: rms/σ of the channels in which the improved model leaves significantly more than noise.
+    - `left`: rms/σ of the channels in which the improved model leaves significantly more than noise. `random`: of
+      these, what noise and the model's disturbance leave.
     - `baseline_runs`, `improved_runs`: whether each runs through the test runs without diverging.
     """
 
@@ -193,6 +194,7 @@ class Explained:
     left: dict[str, float]
     baseline_runs: bool = True
     improved_runs: bool = True
+    random: dict[str, float] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)

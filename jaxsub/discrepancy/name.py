@@ -81,6 +81,8 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
     """
     chosen: list[int] = []
     scans, p_values = [], []
+    if not selector.candidates:
+        return chosen, [selector.scan(chosen)], [1.0]
     while True:
         progress(f"weighing the vocabulary ({len(chosen)} effects so far)")
         scan = _settled(selector, chosen)

@@ -15,7 +15,7 @@ from ..results import RESULTS
 from ..vehicle import AbstractVehicle, vehicle_findings
 from .acceptance import Examination, Model, ModelFitter, fitted_model
 from .advice import next_manoeuvre
-from .consistency import consistent, expected_errors
+from .consistency import consistent
 from .diagnosis import Candidate, Conclusions, ForceTrace, Location, Physics, Rival
 from .effect_forces import effect_forces
 from .evaluation import overlays
@@ -118,7 +118,7 @@ class _Account:
         channels = channel_quality(improved)
         shown = shown_on(test, vehicle, train, [baseline, best] if best.added else [baseline], channels)
         if shown is not None:
-            judged = consistent(judged, shown.explained, shown.left, expected_errors(best.view), shown.assessment)
+            judged = consistent(judged, shown.explained, shown.left, shown.assessment)
         where = _where(judged, self.first, field, train)
         own = improved if named is best else with_coloured_errors(named.view, named.fit)
         physics = [_physics(one, own) for one in judged.named]

@@ -10,7 +10,7 @@ from ..estimate.assessment import Assessment
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
 from .acceptance import Model
-from .consistency import assessed, compared
+from .consistency import assessed, compared, expected_errors
 from .diagnosis import ChannelQuality, Explained, Gain, Remainder
 from .evaluation import Evaluation, evaluated, test_gain
 from .validation import remainders
@@ -64,6 +64,7 @@ def shown_on(
     labels = ["baseline", "improved"][: len(models)]
     remains = {label: remainders(one.error, test, layout, sigma) for label, one in zip(labels, found, strict=True)}
     assessment = assessed(after.error, test, layout.measured, sigma)
-    explained = compared(before.rms, after.rms, remains["baseline"], quality, assessment)
+    expected = expected_errors(models[-1].view)
+    explained = compared(before.rms, after.rms, remains["baseline"], quality, expected, assessment)
     gain = test_gain(before, after, pieces) if len(models) > 1 else None
     return Shown(before, after, remains, explained, assessment, gain)

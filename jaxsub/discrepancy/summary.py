@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ..effects import AbstractEffect, SmoothForce
 from .consistency import sigmas
 from .diagnosis import Explained, Location, Physics, Verdict
-from .settings import SIGNIFICANCE
+from .settings import LARGE_ERROR, SIGNIFICANCE
 
 
 def summary(
@@ -74,7 +74,9 @@ def _nothing(found: Explained | None, p_value: float) -> str:
         return f"{start}."
     if not found.left:
         return f"{start}: the model explains the recordings, and the test run to its noise."
-    return f"{start}, but the simulation error on the test run is more than its noise: {sigmas(found.left)}."
+    large = {channel: value for channel, value in found.random.items() if found.left[channel] > LARGE_ERROR}
+    why = f"; noise and random disturbance forces leave {sigmas(large)}" if large else ""
+    return f"{start}, but the simulation error on the test run is more than its noise: {sigmas(found.left)}{why}."
 
 
 def _test_error(found: Explained) -> str:

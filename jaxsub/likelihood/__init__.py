@@ -18,7 +18,7 @@ from .disturbance import (
 )
 from .innovation_products import part_length
 from .innovations import FilteredRuns, filter_runs
-from .open_loop import open_loop_variance
+from .open_loop import open_loop_errors
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
 from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise_runs, propagate
 
@@ -42,7 +42,7 @@ __all__ = [
     "jacobians",
     "linearise_runs",
     "negative_log_likelihood",
-    "open_loop_variance",
+    "open_loop_errors",
     "output_errors",
     "padded_width",
     "part_length",

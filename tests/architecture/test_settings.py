@@ -28,6 +28,7 @@ ALLOWED = {
     },
     "is the resolution of a grid, a difference or a random test": {
         "columns.py": {"_NUDGE", "_SMALL", "_AT_ONCE"}, "spline_basis.py": {"_CHOOSING"},
+        "consistency.py": {"_DRAWS", "_SEED"},
         "multiplicity.py": {"_DRAWS", "_SEED"}, "process_noise.py": {"_SEED"}, "regime.py": {"_SHIFTS"},
         "smoothness.py": {"FINE", "_SIZES"}, "tones.py": {"_LINES"}, "validation.py": {"_DELAYS"},
     },

@@ -49,10 +49,10 @@ def remainder(low):
     return Remainder(low, 1.1 * low, 800, np.zeros(0), np.zeros(0), 0.5, {}, None, 1.0)
 
 
-def explained(before, after, noise=None):
+def explained(before, after, noise=None, random=STILL):
     was, left, _ = simulated(*before)
     now, remains, assessment = simulated(*after, seed=1)
-    return compared(was, now, left, noise or quality(), assessment), remains, assessment
+    return compared(was, now, left, noise or quality(), random, assessment), remains, assessment
 
 
 @quick
@@ -60,7 +60,7 @@ def explained(before, after, noise=None):
 def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
     """Claim: with any channel's interval above 2 σ the verdict is unknown, with the reason; else it is left alone."""
     found, remains, assessment = explained((v, psi), (v, psi))
-    judged = consistent(Judged("none", [], p_value, ["said"]), found, remains, STILL, assessment)
+    judged = consistent(Judged("none", [], p_value, ["said"]), found, remains, assessment)
     far = [c for c in CHANNELS if remains[c].low > LARGE_ERROR]
     assert judged.verdict == ("unknown" if far else "none")
     assert judged.notes[0] == "said" and judged.p_value == (min(p_value, assessment.size) if far else p_value)
@@ -75,22 +75,23 @@ def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
 def test_other_verdicts_are_left_alone(verdict):
     found, remains, assessment = explained((9.0, 9.0), (9.0, 9.0))
     judged = Judged(verdict, [], 1e-9, [])
-    assert consistent(judged, found, remains, STILL, assessment) is judged
+    assert consistent(judged, found, remains, assessment) is judged
 
 
 @quick
 @given(v=sizes, psi=sizes, random=sizes)
 def test_an_error_as_large_as_random_forces_make_it_is_no_mismatch(v, psi, random):
     """Claim: of a channel that random forces move, twice what they leave is far above it; what they leave is told."""
-    found, remains, assessment = explained((v, psi), (v, psi))
     expected = {"v": 1.0, "psi": random}
-    judged = consistent(Judged("none", [], 1.0, []), found, remains, expected, assessment)
+    found, remains, assessment = explained((v, psi), (v, psi), random=expected)
+    judged = consistent(Judged("none", [], 1.0, []), found, remains, assessment)
     far = [c for c in CHANNELS if remains[c].low > LARGE_ERROR * expected[c]]
     assert judged.verdict == ("unknown" if far else "none")
     assert judged.decisions[-1].outcome == ("large" if far else "not large")
-    told = not far and remains["psi"].low > LARGE_ERROR
-    assert bool(judged.notes) == bool(far or told)
-    assert not told or f"{random:.3g} σ in psi" in judged.notes[-1]
+    assert bool(judged.notes) == bool(far)
+    said = summary("none", [], [], [], found, 1.0)
+    assert ("random disturbance forces leave" in said) == (max(found.left.values(), default=0.0) > LARGE_ERROR)
+    assert f"{random:.3g} σ in psi" in said or not found.left.get("psi", 0.0) > LARGE_ERROR
 
 
 def test_a_model_that_diverges_on_the_test_run_is_not_none():
@@ -98,9 +99,9 @@ def test_a_model_that_diverges_on_the_test_run_is_not_none():
     run = Recording("run", times, dict.fromkeys(CHANNELS, np.zeros(50)), "test")
     wild = assessed([np.full((50, 2), np.nan)], [run], dict(zip(CHANNELS, CHANNELS, strict=True)), SIGMA)
     lost = dict.fromkeys(CHANNELS, math.nan)
-    found = compared(lost, lost, {c: remainder(math.nan) for c in CHANNELS}, quality(), wild)
+    found = compared(lost, lost, {c: remainder(math.nan) for c in CHANNELS}, quality(), STILL, wild)
     assert found == Explained(None, {}, False, False)
-    judged = consistent(Judged("none", [], 1.0, []), found, {c: remainder(math.nan) for c in CHANNELS}, STILL, wild)
+    judged = consistent(Judged("none", [], 1.0, []), found, {c: remainder(math.nan) for c in CHANNELS}, wild)
     assert judged.verdict == "unknown" and "diverges" in judged.notes[-1]
     assert "diverges" in summary("unknown", [], [], [], found, 1.0)
 

@@ -113,14 +113,15 @@ def test_a_slow_random_force_is_no_effect(lengths):
 
 
 @pytest.mark.long
-def test_random_forces_far_above_the_noise_are_not_none():
-    """Claim: where the test run's error is 25 σ the verdict is unknown with its p-value, though no effect is named."""
+def test_random_forces_far_above_the_noise_are_no_missing_effect():
+    """Claim: where random forces make the test run's error 25 σ nothing is named, and the verdict says that they do."""
     runs = disturbed(3.0, (40.0, 120.0), 1)
     found, _ = diagnose(wrong(), runs[:2], runs[2:], vocabulary=SMALL)
-    assert (found.verdict, found.physics) == ("unknown", [])
-    assert found.p_value < 1e-6 and max(found.explained.left.values()) > 10.0
-    assert "Simulation error on the test run" in found.summary
-    assert any("unknown and not none" in note for note in found.notes)
+    assert (found.verdict, found.physics) == ("none", [])
+    assert max(found.explained.left.values()) > 10.0
+    for channel, rms in found.explained.left.items():
+        assert 0.4 < rms / found.explained.random[channel] < 2.0
+    assert "random disturbance forces leave" in found.summary
 
 
 @pytest.mark.long

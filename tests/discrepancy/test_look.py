@@ -104,9 +104,14 @@ def test_what_is_random_is_as_large_as_many_simulations_are_off():
     system = scipy.signal.StateSpace(
         [[0.0, 1.0], [-values["K_x"], -values["D_x"]]], [[0.0], [1.0]], np.eye(2), np.zeros((2, 1))
     )
+    still = np.zeros_like(times)
+    begun = np.stack([scipy.signal.lsim(system, still, times, x0)[1] for x0 in np.eye(2)], axis=-1) / [[0.01], [0.02]]
+    fitted = np.linalg.pinv(begun.reshape(-1, 2))
     off = np.stack([scipy.signal.lsim(system, one, times)[1] for one in force])
+    taken = np.stack([(begun @ (fitted @ (one / [0.01, 0.02]).ravel())) * [0.01, 0.02] for one in off])
+    off = off - taken
     rms = np.sqrt(1.0 + np.mean((off / [0.01, 0.02]) ** 2, axis=(0, 1)))
-    np.testing.assert_allclose([*expected_errors(pushed(slow)).values()], rms, rtol=0.05)
+    np.testing.assert_allclose([*expected_errors(pushed(slow)).values()], rms, rtol=0.1)
     assert [*expected_errors(pushed(30.0)).values()] == [1.0, 1.0]
 
 

@@ -6,7 +6,7 @@ import pytest
 from rigs import driven, oscillator
 
 from jaxsub.discrepancy import diagnose
-from jaxsub.effects import AsymmetricDamping, CoulombFriction, CubicStiffness, QuadraticDamping
+from jaxsub.effects import AsymmetricDamping, CoulombFriction, CubicStiffness, QuadraticDamping, SmoothForce
 from jaxsub.simulation import synthetic
 
 KINDS = (AsymmetricDamping, CoulombFriction, CubicStiffness, QuadraticDamping)
@@ -37,3 +37,14 @@ def test_a_spent_budget_gives_the_answer_so_far():
     assert (found.complete, found.verdict, found.physics) == (False, "unknown", [])
     assert found.p_value < 1e-6 and any("incomplete" in note for note in found.notes)
     assert found.to_json()["complete"] is False and found.fit["held_out"]["baseline"]
+
+
+def test_without_any_vocabulary_a_mismatch_is_modelled_and_has_no_name():
+    """Claim: with no candidate at all a drag that is left out is unknown, and a smooth force takes it up."""
+    truth = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-0.4)))
+    inputs = [driven(truth, 0.1 * np.arange(300), seed, amplitude=1.0) for seed in range(3)]
+    runs = synthetic(truth, inputs, seed=4)
+    found, improved = diagnose(oscillator(), runs[:2], runs[2:], vocabulary=())
+    assert (found.verdict, found.physics, found.candidates) == ("unknown", [], [])
+    assert [type(effect) for effect in improved.effects] == [SmoothForce]
+    assert found.explained is not None and found.explained.share is not None and found.explained.share > 0.9
