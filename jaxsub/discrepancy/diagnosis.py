@@ -1,4 +1,4 @@
-"""What a diagnosis says: plain data that the report draws and `diagnosis.json` holds (formats.md)."""
+"""What a diagnosis says: plain data that the report draws and `diagnosis.json` holds."""
 
 import dataclasses
 import math

@@ -50,7 +50,7 @@ class InnovationModels:
     ) -> Model:
         """A model with `effects` added, estimated from its own parameters or from the first vehicle `near`."""
         make_room()
-        self.fitter.progress(f"following with {', '.join(effect.label for effect in effects)}")
+        self.fitter.progress(f"following with {', '.join(effect.label for effect in effects) or 'no effect'}")
         vehicle = near[0] if near else with_scaled_effects(model.view.vehicle, effects, 1.0)
         runs = model.view.runs
         finer = max(runs.substeps, substeps_for(vehicle, runs, model.view.path.start))

@@ -134,7 +134,7 @@ def recorded_limits(vehicle: AbstractVehicle, like: Recording) -> ManoeuvreLimit
     shown = vehicle.channels(vehicle.motion(states, runs.signals[0]))
     body = layout.kind == "submerged-body"
     channels: dict[str, Range] = {}
-    for name in [n for n in ("phi", "theta", "z") if n in layout.positions] if body else layout.equations:
+    for name in filter(layout.tells, ("phi", "theta", "z")) if body else layout.equations:
         seen = like.columns.get(name, np.full(1, np.nan))
         seen = seen[np.isfinite(seen)] if np.isfinite(seen).any() else np.asarray(shown[name])
         low, high = float(seen.min()), float(seen.max())

@@ -1,13 +1,14 @@
 """A designed manoeuvre separates rivals by what it promises, more than the recorded inputs, and inside their limits."""
 
 import functools
+import tomllib
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from rigs import oscillator
+from rigs import driven, oscillator
 
 from jaxsub.cli import simulate as simulate_command
 from jaxsub.discrepancy.manoeuvre import recorded_limits, separating_manoeuvre
@@ -19,7 +20,7 @@ from jaxsub.information.design_limits import Bounds, ManoeuvreLimits
 from jaxsub.information.design_search import descend
 from jaxsub.recording import Recording, load, save
 from jaxsub.simulation import prbs, sampled_states, simulate, synthetic
-from jaxsub.vehicle import write_vehicle
+from jaxsub.vehicle import vehicle_from, vehicle_text, write_vehicle
 from jaxsub.vehicle.catalogue import dsrv
 
 SAMPLES, INTERVAL = 61, 0.2
@@ -140,6 +141,19 @@ def test_designed_inputs_keep_what_the_recordings_used(found):
     low, high = kept
     (answer,) = synthetic(RIVALS[0], [found.recording], seed=0, noise=False, states=sampled_states)
     assert low - 0.05 < answer.column("x").min() and answer.column("x").max() < high + 0.05
+
+
+def test_a_body_keeps_its_attitude_however_that_is_described():
+    """Claim: by a quaternion the limits of roll, pitch and depth are those by Euler angles, of the same run."""
+    text = vehicle_text(dsrv())
+    assert "attitude" not in text
+    turned = text.replace("[coefficients]", '[model]\nattitude = "quaternion"\n\n[coefficients]', 1)
+    told = [vehicle_from(tomllib.loads(one), "dsrv.toml") for one in (text, turned)]
+    run = driven(told[0], TIMES, seed=3)
+    plain, same = (recorded_limits(vehicle, run).channels for vehicle in told)
+    assert "theta" in plain and {*plain} <= {*same}
+    for name, limits in plain.items():
+        np.testing.assert_allclose(same[name], limits, atol=1e-6)
 
 
 def test_limits_whose_sides_differ_are_kept_from_where_the_actuator_began():
