@@ -73,9 +73,15 @@ def recovery(lines: Lines, answer: Callable[[dict], dict | None]) -> dict:
 
 
 def sets(every: Lines) -> dict[str, dict]:
-    """What `assemble` makes of the fresh cases and of those on which engines were corrected, where there are any."""
-    chosen = {name: [line for line in every if line["fresh"] == fresh] for name, fresh in _SETS.items()}
-    return {name: assemble(lines) for name, lines in chosen.items() if lines}
+    """What `assemble` makes of fresh cases and of those on which engines were corrected, of each engine by itself."""
+    engines = list(dict.fromkeys(line["engine"] for line in every))
+    found = {}
+    for name, fresh in _SETS.items():
+        for number, engine in enumerate(engines, 1):
+            lines = [line for line in every if line["fresh"] == fresh and line["engine"] == engine]
+            label = name if len(engines) == 1 else f"{name}, engine {number}"
+            found |= {label: assemble(lines)} if lines else {}
+    return found
 
 
 def assemble(every: Lines) -> dict:

@@ -33,12 +33,13 @@ def test_a_spent_budget_gives_the_answer_so_far():
     truth = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-0.4)))
     inputs = [driven(truth, 0.1 * np.arange(300), seed, amplitude=1.0) for seed in range(3)]
     runs = synthetic(truth, inputs, seed=4)
-    found, _ = diagnose(oscillator(), runs[:2], runs[2:], vocabulary=KINDS, budget=0.0)
+    found, _ = diagnose(oscillator(), runs[:2], runs[2:], vocabulary=(), budget=0.0)
     assert (found.complete, found.verdict, found.physics) == (False, "unknown", [])
     assert found.p_value < 1e-6 and any("incomplete" in note for note in found.notes)
     assert found.to_json()["complete"] is False and found.fit["held_out"]["baseline"]
 
 
+@pytest.mark.long
 def test_without_any_vocabulary_a_mismatch_is_modelled_and_has_no_name():
     """Claim: with no candidate at all a drag that is left out is unknown, and a smooth force takes it up."""
     truth = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-0.4)))
