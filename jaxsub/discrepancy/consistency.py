@@ -36,7 +36,7 @@ def compared(
     """What the improved model removes of the baseline's excess variance on the test runs, and what it leaves.
 
     `before` and `after` are rms/σ of the two models there by channel, `baseline` is what the first one leaves,
-    `expected` the `expected_errors` of the second, and `assessment` has the tests of what it leaves.
+    `expected` the `expected_errors` of the second where any is too large, and `assessment` the tests of what it leaves.
     """
     floor = {one.channel: (one.record_sigma / one.sigma) ** 2 if one.sigma_estimated else 1.0 for one in quality}
     excess = lambda rms: sum(max(value**2 - floor[channel], 0.0) for channel, value in rms.items())

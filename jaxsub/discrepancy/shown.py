@@ -64,7 +64,7 @@ def shown_on(
     labels = ["baseline", "improved"][: len(models)]
     remains = {label: remainders(one.error, test, layout, sigma) for label, one in zip(labels, found, strict=True)}
     assessment = assessed(after.error, test, layout.measured, sigma)
-    expected = expected_errors(models[-1].view)
+    expected = expected_errors(models[-1].view) if assessment.oversized else {}
     explained = compared(before.rms, after.rms, remains["baseline"], quality, expected, assessment)
     gain = test_gain(before, after, pieces) if len(models) > 1 else None
     return Shown(before, after, remains, explained, assessment, gain)

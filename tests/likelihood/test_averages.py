@@ -5,8 +5,9 @@ import itertools
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from random_systems import random_system
 
-from jaxsub.likelihood import Averages, Disturbance, System, group_means, propagate
+from jaxsub.likelihood import Averages, Disturbance, group_means, propagate
 
 RUNS, SAMPLES, STATES, FORCES, CHANNELS, GROUPS = 2, 11, 3, 2, 2, 3
 # samples at which the groups of 10 intervals begin, and the last ends
@@ -19,14 +20,7 @@ def system():
     rng = np.random.default_rng(21)
     measured = rng.random((RUNS, SAMPLES, CHANNELS)) > 0.2
     measured[0, 4:8, 1] = False
-    return System(
-        A=jnp.asarray(0.6 * rng.standard_normal((RUNS, SAMPLES - 1, STATES, STATES))),
-        G=jnp.asarray(rng.standard_normal((RUNS, SAMPLES - 1, STATES, 2 * FORCES))),
-        C=jnp.asarray(rng.standard_normal((RUNS, SAMPLES, CHANNELS, STATES)) * measured[..., None]),
-        measured=jnp.asarray(measured),
-        intervals=jnp.asarray(rng.uniform(0.1, 0.5, (RUNS, SAMPLES - 1))),
-        start_std=jnp.ones(STATES),
-    )
+    return random_system(rng, measured, STATES, FORCES)
 
 
 def response(system, start, force):

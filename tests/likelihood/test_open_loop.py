@@ -2,8 +2,9 @@
 
 import jax.numpy as jnp
 import numpy as np
+from random_systems import random_system
 
-from jaxsub.likelihood import Disturbance, System, open_loop_errors, propagate
+from jaxsub.likelihood import Disturbance, open_loop_errors, propagate
 
 RUNS, SAMPLES, STATES, FORCES, CHANNELS = 2, 9, 3, 2, 2
 
@@ -12,14 +13,7 @@ def test_errors_have_the_variance_of_the_response_that_no_initial_state_takes_up
     """Claim: diag P M Σ Mᵀ P, Σ = q² e^(-|t - t'|/τ) of a force, M the response to it, P what a start leaves."""
     rng = np.random.default_rng(31)
     measured = rng.random((RUNS, SAMPLES, CHANNELS)) > 0.2
-    system = System(
-        A=jnp.asarray(0.6 * rng.standard_normal((RUNS, SAMPLES - 1, STATES, STATES))),
-        G=jnp.asarray(rng.standard_normal((RUNS, SAMPLES - 1, STATES, 2 * FORCES))),
-        C=jnp.asarray(rng.standard_normal((RUNS, SAMPLES, CHANNELS, STATES)) * measured[..., None]),
-        measured=jnp.asarray(measured),
-        intervals=jnp.asarray(rng.uniform(0.1, 0.5, (RUNS, SAMPLES - 1))),
-        start_std=jnp.ones(STATES),
-    )
+    system = random_system(rng, measured, STATES, FORCES)
     disturbance = Disturbance(jnp.array([2.0, 0.3]), jnp.array([0.4, 5.0]), jnp.ones(CHANNELS))
     # one column for each sample of each force
     force = np.eye(SAMPLES * FORCES).reshape(SAMPLES, FORCES, -1)
