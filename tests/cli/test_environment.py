@@ -34,7 +34,7 @@ def ran(starts=1, before="", folder=None, **environment):
     return done.stderr
 
 
-@pytest.mark.parametrize("home", ["/proc/none", "/dev/null"])
+@pytest.mark.parametrize("home", ["/proc/none", pytest.param("/dev/null", marks=pytest.mark.long)])
 def test_without_a_home_that_can_be_written_it_goes_on_and_says_so(home):
     said = ran(HOME=home)
     assert said.count("\n") == 1 and said.startswith("note: compiled programs are not kept")
@@ -57,7 +57,12 @@ def test_for_a_user_without_a_home_nothing_is_written_to_the_current_folder(tmp_
 
 @pytest.mark.parametrize(
     ("given", "long", "expected"),
-    [(None, False, "cpu"), ("", False, "cpu"), ("cuda,cpu", False, "cuda,cpu"), (None, True, "None")],
+    [
+        (None, False, "cpu"),
+        pytest.param("", False, "cpu", marks=pytest.mark.long),
+        pytest.param("cuda,cpu", False, "cuda,cpu", marks=pytest.mark.long),
+        pytest.param(None, True, "None", marks=pytest.mark.long),
+    ],
 )
 def test_short_commands_take_an_accelerator_only_where_it_is_named(given, long, expected):
     """Claim: what is not long runs on the processor, though JAX would pick a GPU; what the user names is kept."""
@@ -114,7 +119,12 @@ print(os.environ["XLA_FLAGS"])
 
 @pytest.mark.parametrize(
     ("sizes", "given", "level"),
-    [([1000, 1000], "", 0), ([1000, 300_000], "", 1), ([1000], "--xla_backend_optimization_level=3", 3), ([], "", 1)],
+    [
+        ([1000, 1000], "", 0),
+        pytest.param([1000, 300_000], "", 1, marks=pytest.mark.long),
+        ([1000], "--xla_backend_optimization_level=3", 3),
+        pytest.param([], "", 1, marks=pytest.mark.long),
+    ],
 )
 def test_programs_for_small_recordings_are_not_optimised(tmp_path, sizes, given, level):
     """Claim: XLA is told level 0 for small files, 1 for larger ones and what is none, and what the caller set stays."""

@@ -1,11 +1,13 @@
 """A small vehicle, recorded with and without a concealed effect: fast enough to diagnose in a test."""
 
+import json
 from functools import cache
 
 import jax.numpy as jnp
 import numpy as np
 from scipy.signal import lfilter
 
+from jaxsub.discrepancy import Conclusions
 from jaxsub.effects import AbstractEffect, CrossflowDrag, HullAsymmetry, QuadraticDamping, SensorScale
 from jaxsub.recording import Recording
 from jaxsub.simulation.manoeuvres import prbs
@@ -53,3 +55,27 @@ def disturbed(time: float, size: tuple[float, float], seed: int) -> tuple[Record
     push = jnp.asarray(np.stack([force[:, :-1], force[:, 1:]], axis=2))
     states = lambda vehicle, runs, start: Sampled.of(vehicle, runs).states(runs, start, push)
     return tuple(synthetic(dsrv(), driven(seed), seed=seed, states=states))
+
+
+def require_named(found: Conclusions, effect: AbstractEffect) -> None:
+    """Named where it acts, within four standard errors, with the test run at the noise, as in the file of it."""
+    assert found.verdict == "named"
+    (physics,) = found.physics
+    assert physics.effect == effect.name
+    assert found.where[0].where in effect.where
+    for estimate in physics.parameters.values():
+        truth = float(getattr(effect, next(iter(effect.symbols()))))
+        assert abs(estimate.value - truth) < 4.0 * estimate.standard_error
+    before, after = (found.fit["held_out"][key] for key in ("baseline", "improved"))
+    assert max(before.values()) > 1.2
+    assert max(after.values()) < 1.15
+    assert min(left.random for left in found.remains["baseline"].values()) < 1e-6
+    for channel, left in found.remains["improved"].items():
+        assert min(left.random, left.independent) > 1e-3
+        assert left.low < after[channel] < left.high
+    assert found.gain.ratio < 0.8 and found.gain.p_value < 0.05
+    outcomes = {candidate.label: candidate.outcome for candidate in found.candidates}
+    assert outcomes[physics.label] == "accepted"
+    assert {outcomes[rival.label] for rival in physics.rivals if rival.label in outcomes} <= {"rival"}
+    content = json.loads(json.dumps(found.to_json()))
+    assert content["schema"] == 1 and content["physics"][0]["effect"] == effect.name

@@ -28,10 +28,8 @@ def baseline(runs):
     return fit(wrong(), batch(wrong(), runs))
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [pytest.param("structure", marks=pytest.mark.long), pytest.param("actuator", marks=pytest.mark.long), "sensor"],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["structure", "actuator", "sensor"])
 def test_what_leads_is_of_the_kind_that_was_concealed(kind):
     """Claim: its probability is above 0.95; beside it the true numbers are not refused, and wrong ones are."""
     effect = CONCEALED[kind]

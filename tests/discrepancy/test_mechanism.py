@@ -28,6 +28,7 @@ def test_damping_that_differs_by_direction_is_named():
     assert next(iter(found.kinds)) == "structure"
 
 
+@pytest.mark.long
 def test_a_spent_budget_gives_the_answer_so_far():
     """Claim: with no time for any fit the mismatch is there, incomplete and without a name; the test run is shown."""
     truth = oscillator().with_effect(QuadraticDamping("x", jnp.asarray(-0.4)))

@@ -76,6 +76,7 @@ def test_an_interrupted_diagnosis_ends_with_the_answer_so_far(files, tmp_path):
     assert not list(tmp_path.glob(".jaxsub-*"))
 
 
+@pytest.mark.long
 def test_a_killed_diagnosis_leaves_the_answer_so_far(killed):
     """Claim: kill -9 leaves the effect accepted so far and a vehicle that has it; no test run was looked at."""
     found, out = killed

@@ -28,8 +28,9 @@ def written(path, folder):
 
 
 def marked(path):
-    # the posterior's other tests draw from it too, and its guide takes a minute
-    return pytest.param(path, id=path.stem, marks=[pytest.mark.long] if path.stem == "posterior" else [])
+    # the posterior's other tests draw from it too, and its guide takes a minute; the other takes 14 s
+    long = path.stem in ("posterior", "add-a-vehicle")
+    return pytest.param(path, id=path.stem, marks=[pytest.mark.long] if long else [])
 
 
 @pytest.mark.parametrize("path", [marked(p) for p in GUIDES if blocks(p, "python")])

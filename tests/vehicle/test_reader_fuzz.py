@@ -72,7 +72,9 @@ outputs = { x = { sigma = 0.1 }, y_rate = {} }
 effects = [{ effect = "coulomb-friction", equation = "x", smoothing = 0.1 }]
 """
 ACTUATED = (Path(__file__).parent / "earlier" / "actuators.toml").read_text(encoding="utf-8")
-FILES = pytest.mark.parametrize("text", [BODY, RIG, ACTUATED], ids=["body", "rig", "actuated"])
+FILES = pytest.mark.parametrize(
+    "text", [BODY, RIG, pytest.param(ACTUATED, marks=pytest.mark.long)], ids=["body", "rig", "actuated"]
+)
 fuzz = settings(
     derandomize=True, deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
