@@ -1,7 +1,8 @@
 r"""What the simulation error on the test runs says of a verdict: how much of it is explained, and what is left.
 
-The excess variance of a channel is $\overline{e^2}/\sigma^2 - n$, of which the noise floor $n$ is 1 where σ is stated,
-and the white part of the recording where it is not.
+Errors are held against the noise $s$ of a channel: σ where it is stated, else the white part of what the improved model
+leaves of the training runs, since an estimated σ is as large as whatever the baseline lacks. The excess variance of a
+channel is $\overline{e^2}/s^2 - 1$.
 """
 
 import dataclasses
@@ -15,7 +16,7 @@ from ..estimate.assessment import Assessment, assess_residuals
 from ..likelihood import open_loop_errors
 from ..recording import Recording
 from .decisions import Decision
-from .diagnosis import ChannelQuality, Explained, Remainder
+from .diagnosis import ChannelQuality, Explained
 from .settings import BLOCKS, LARGE_ERROR, LISTED
 from .validation import stacked_columns
 from .verdict import Judged
@@ -25,24 +26,29 @@ from .view import View
 _DRAWS, _SEED = 32, 0
 
 
+def noise(quality: Sequence[ChannelQuality]) -> Float[np.ndarray, " c"]:
+    """The noise of channels of a `quality`, SI."""
+    white = [one.record_sigma if one.sigma_estimated else one.sigma for one in quality]
+    return np.maximum(white, np.finfo(float).tiny)
+
+
 def compared(
     before: Mapping[str, float],
     after: Mapping[str, float],
-    baseline: Mapping[str, Remainder],
-    quality: Sequence[ChannelQuality],
+    low: Mapping[str, float],
     expected: Mapping[str, float],
     assessment: Assessment,
 ) -> Explained:
     """What the improved model removes of the baseline's excess variance on the test runs, and what it leaves.
 
-    `before` and `after` are rms/σ of the two models there by channel, `baseline` is what the first one leaves,
-    `expected` the `expected_errors` of the second where any is too large, and `assessment` the tests of what it leaves.
+    `before` and `after` are the two models' rms there by channel, over its noise, and `low` the low ends of the first
+    one's intervals; `expected` are the `expected_errors` of the second where any is too large, and `assessment` the
+    tests of what it leaves.
     """
-    floor = {one.channel: (one.record_sigma / one.sigma) ** 2 if one.sigma_estimated else 1.0 for one in quality}
-    excess = lambda rms: sum(max(value**2 - floor[channel], 0.0) for channel, value in rms.items())
+    excess = lambda rms: sum(max(value**2 - 1.0, 0.0) for value in rms.values())
     runs = all(math.isfinite(value) for value in before.values())
     # a share of an excess that is none would be noise over noise
-    significant = any(one.low**2 > floor[channel] for channel, one in baseline.items())
+    significant = any(value > 1.0 for value in low.values())
     share = 1.0 - excess(after) / excess(before) if runs and assessment.runs_model and significant else None
     left = {one.channel: after[one.channel] for one in assessment.oversized}
     return Explained(share, left, runs, assessment.runs_model, {channel: expected[channel] for channel in left})
@@ -52,20 +58,22 @@ def assessed(
     error: Sequence[Float[np.ndarray, "k c"]],
     recordings: Sequence[Recording],
     columns: Mapping[str, str],
-    sigma: Float[np.ndarray, " c"],
+    scale: Float[np.ndarray, " c"],
 ) -> Assessment:
     """The tests of size, whiteness and spikes of a model's simulation `error` on `recordings`, a run each, in SI.
 
-    `columns` has the measured column of each output.
+    `columns` has the measured column of each output, and `scale` its noise, SI.
     """
     pairs = [stacked_columns([run.column(column) for run in recordings]) for column in columns.values()]
     mask = np.stack([there for _, there in pairs], axis=-1)
-    whitened = np.stack([run[: mask.shape[1]] / sigma for run in error])
+    whitened = np.stack([run[: mask.shape[1]] / scale for run in error])
     return assess_residuals(tuple(columns), np.where(mask, whitened, 0.0), mask)
 
 
-def expected_errors(view: View) -> dict[str, float]:
-    """By channel the rms/σ that noise and a view's disturbance leave in a simulation, its initial states fitted.
+def expected_errors(view: View, scale: Float[np.ndarray, " c"]) -> dict[str, float]:
+    """By channel the rms that noise and a view's disturbance leave in a simulation, its initial states fitted.
+
+    It is over the noise, which is `scale` in SI.
 
     A force counts that changes within a block of a run (`BLOCKS`): what is slower is no more random in a run than
     missing physics is.
@@ -77,20 +85,21 @@ def expected_errors(view: View) -> dict[str, float]:
     draws = np.random.default_rng(_SEED).standard_normal((*measured.shape[:2], len(random), _DRAWS))
     errors = open_loop_errors(dataclasses.replace(disturbance, force=random), system, draws)
     samples = np.maximum(np.sum(measured, axis=(0, 1)), 1)
-    rms = np.sqrt(1.0 + np.sum(np.mean(errors**2, axis=-1), axis=(0, 1)) / samples)
+    squares = np.sum(np.mean(errors**2, axis=-1), axis=(0, 1)) / samples
+    rms = np.sqrt(1.0 + squares * (np.asarray(view.sigma) / scale) ** 2)
     return dict(zip(view.vehicle.layout.channels, rms.tolist(), strict=True))
 
 
-def consistent(judged: Judged, found: Explained, remains: Mapping[str, Remainder], assessment: Assessment) -> Judged:
+def consistent(judged: Judged, found: Explained, low: Mapping[str, float], assessment: Assessment) -> Judged:
     """The verdict, unless it is `none` and the test runs' error is far above what is random: then `unknown`, and why.
 
-    `remains` is what the last model leaves of each channel there and `assessment` the tests of it, of which the one of
-    size then has the mismatch's p-value.
+    `low` are the low ends of the intervals of the last model's error there over the noise, by channel, and `assessment`
+    has the tests of it, of which the one of size then has the mismatch's p-value.
     """
     if judged.verdict != "none":
         return judged
     # the 95 % interval of a channel's error lies far above what is random, which no `none` may leave
-    over = {channel: remains[channel].low / found.random[channel] for channel in found.left}
+    over = {channel: low[channel] / found.random[channel] for channel in found.left}
     most = max(over.values(), default=0.0) if found.improved_runs else math.inf
     test = "low end of the test error's interval over what noise and disturbance leave"
     decision = Decision("mismatch", test, most, LARGE_ERROR, "large" if most > LARGE_ERROR else "not large")

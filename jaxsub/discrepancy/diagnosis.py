@@ -185,8 +185,9 @@ class Explained:
 
     - `share`: of the baseline's excess variance over the noise, what the improved model removes; None where the
       baseline leaves no significant excess, or one of the two diverges.
-    - `left`: rms/σ of the channels in which the improved model leaves significantly more than noise. `random`: of
-      these, what noise and the model's disturbance leave.
+    - `left`: rms over the noise of the channels in which the improved model leaves significantly more than that.
+      `random`: of these, what noise and the model's disturbance leave. The noise is σ, and where that is estimated the
+      white part of the residuals.
     - `baseline_runs`, `improved_runs`: whether each runs through the test runs without diverging.
     """
 

@@ -118,7 +118,7 @@ class _Account:
         channels = channel_quality(improved)
         shown = shown_on(test, vehicle, train, [baseline, best] if best.added else [baseline], channels)
         if shown is not None:
-            judged = consistent(judged, shown.explained, shown.left, shown.assessment)
+            judged = consistent(judged, shown.explained, shown.low, shown.assessment)
         where = _where(judged, self.first, field, train)
         own = improved if named is best else with_coloured_errors(named.view, named.fit)
         physics = [_physics(one, own) for one in judged.named]

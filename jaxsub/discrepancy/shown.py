@@ -10,7 +10,7 @@ from ..estimate.assessment import Assessment
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
 from .acceptance import Model
-from .consistency import assessed, compared, expected_errors
+from .consistency import assessed, compared, expected_errors, noise
 from .diagnosis import ChannelQuality, Explained, Gain, Remainder
 from .evaluation import Evaluation, evaluated, test_gain
 from .validation import remainders
@@ -23,6 +23,7 @@ class Shown:
     **Fields**
 
     - `remains`: what each leaves, by model and channel. `explained`: what the improved one removes.
+    - `low`: the low ends of the intervals of the improved one's errors over the noise, by channel.
     - `assessment`: the tests of what the improved one leaves. `gain`: none where there is no improved model.
     """
 
@@ -30,6 +31,7 @@ class Shown:
     after: Evaluation
     remains: dict[str, dict[str, Remainder]]
     explained: Explained
+    low: dict[str, float]
     assessment: Assessment
     gain: Gain | None
 
@@ -54,7 +56,7 @@ def shown_on(
 ) -> Shown | None:
     """The baseline, and the improved model if it is among `models`, simulated along the runs `test`, if there are any.
 
-    `quality` is that of the channels in the training runs, of which the noise floor is.
+    `quality` is that of the channels in the training runs, by the improved model.
     """
     if not test:
         return None
@@ -63,8 +65,11 @@ def shown_on(
     before, after = found[0], found[-1]
     labels = ["baseline", "improved"][: len(models)]
     remains = {label: remainders(one.error, test, layout, sigma) for label, one in zip(labels, found, strict=True)}
-    assessment = assessed(after.error, test, layout.measured, sigma)
-    expected = expected_errors(models[-1].view) if assessment.oversized else {}
-    explained = compared(before.rms, after.rms, remains["baseline"], quality, expected, assessment)
+    scale = noise(quality)
+    over = lambda values: {c: value * float(r) for (c, value), r in zip(values.items(), sigma / scale, strict=True)}
+    low = [over({channel: one.low for channel, one in left.items()}) for left in remains.values()]
+    assessment = assessed(after.error, test, layout.measured, scale)
+    expected = expected_errors(models[-1].view, scale) if assessment.oversized else {}
+    explained = compared(over(before.rms), over(after.rms), low[0], expected, assessment)
     gain = test_gain(before, after, pieces) if len(models) > 1 else None
-    return Shown(before, after, remains, explained, assessment, gain)
+    return Shown(before, after, remains, explained, low[-1], assessment, gain)

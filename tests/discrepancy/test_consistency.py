@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jaxsub.discrepancy.consistency import assessed, compared, consistent
-from jaxsub.discrepancy.diagnosis import ChannelQuality, Explained, Location, Physics, Remainder
+from jaxsub.discrepancy.consistency import assessed, compared, consistent, noise
+from jaxsub.discrepancy.diagnosis import ChannelQuality, Explained, Location, Physics
 from jaxsub.discrepancy.settings import LARGE_ERROR
 from jaxsub.discrepancy.summary import summary
 from jaxsub.discrepancy.verdict import Judged
@@ -26,42 +26,31 @@ quick = settings(derandomize=True, deadline=None, max_examples=60)
 sizes = st.floats(0.9, 20.0)
 
 
-def quality(estimated=False, white=1.0):
-    return [
-        ChannelQuality(c, "m/s", 400, 0.0, float(s), estimated, white * float(s))
-        for c, s in zip(CHANNELS, SIGMA, strict=True)
-    ]
-
-
 def simulated(*rms, seed=0, samples=400):
-    """rms/σ, remainders and the assessment of white errors of that size in σ on two test runs."""
+    """Rms, low ends of intervals and the assessment of white errors of that size in σ on two test runs."""
     rng = np.random.default_rng(seed)
     times = 0.1 * np.arange(samples)
     recordings = [Recording(f"run {i}", times, dict.fromkeys(CHANNELS, np.zeros(samples)), "test") for i in range(2)]
     error = [rng.standard_normal((samples, 2)) * SIGMA * np.array(rms) for _ in recordings]
     own = np.sqrt(np.mean(np.concatenate(error) ** 2, axis=0)) / SIGMA
     sized = dict(zip(CHANNELS, own.tolist(), strict=True))
-    left = {c: remainder(0.95 * value) for c, value in sized.items()}
-    return sized, left, assessed(error, recordings, dict(zip(CHANNELS, CHANNELS, strict=True)), SIGMA)
+    low = {c: 0.95 * value for c, value in sized.items()}
+    return sized, low, assessed(error, recordings, dict(zip(CHANNELS, CHANNELS, strict=True)), SIGMA)
 
 
-def remainder(low):
-    return Remainder(low, 1.1 * low, 800, np.zeros(0), np.zeros(0), 0.5, {}, None, 1.0)
-
-
-def explained(before, after, noise=None, random=STILL):
-    was, left, _ = simulated(*before)
-    now, remains, assessment = simulated(*after, seed=1)
-    return compared(was, now, left, noise or quality(), random, assessment), remains, assessment
+def explained(before, after, random=STILL):
+    was, least, _ = simulated(*before)
+    now, low, assessment = simulated(*after, seed=1)
+    return compared(was, now, least, random, assessment), low, assessment
 
 
 @quick
 @given(v=sizes, psi=sizes, p_value=st.floats(0.0, 1.0))
 def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
     """Claim: with any channel's interval above 2 σ the verdict is unknown, with the reason; else it is left alone."""
-    found, remains, assessment = explained((v, psi), (v, psi))
-    judged = consistent(Judged("none", [], p_value, ["said"]), found, remains, assessment)
-    far = [c for c in CHANNELS if remains[c].low > LARGE_ERROR]
+    found, low, assessment = explained((v, psi), (v, psi))
+    judged = consistent(Judged("none", [], p_value, ["said"]), found, low, assessment)
+    far = [c for c in CHANNELS if low[c] > LARGE_ERROR]
     assert judged.verdict == ("unknown" if far else "none")
     assert judged.notes[0] == "said" and judged.p_value == (min(p_value, assessment.size) if far else p_value)
     assert all(f"σ in {channel}" in judged.notes[-1] for channel in far)
@@ -73,9 +62,9 @@ def test_none_never_stands_beside_an_error_far_above_the_noise(v, psi, p_value):
 
 @pytest.mark.parametrize("verdict", ["named", "ambiguous", "unknown"])
 def test_other_verdicts_are_left_alone(verdict):
-    found, remains, assessment = explained((9.0, 9.0), (9.0, 9.0))
+    found, low, assessment = explained((9.0, 9.0), (9.0, 9.0))
     judged = Judged(verdict, [], 1e-9, [])
-    assert consistent(judged, found, remains, assessment) is judged
+    assert consistent(judged, found, low, assessment) is judged
 
 
 @quick
@@ -83,9 +72,9 @@ def test_other_verdicts_are_left_alone(verdict):
 def test_an_error_as_large_as_random_forces_make_it_is_no_mismatch(v, psi, random):
     """Claim: of a channel that random forces move, twice what they leave is far above it; what they leave is told."""
     expected = {"v": 1.0, "psi": random}
-    found, remains, assessment = explained((v, psi), (v, psi), random=expected)
-    judged = consistent(Judged("none", [], 1.0, []), found, remains, assessment)
-    far = [c for c in CHANNELS if remains[c].low > LARGE_ERROR * expected[c]]
+    found, low, assessment = explained((v, psi), (v, psi), random=expected)
+    judged = consistent(Judged("none", [], 1.0, []), found, low, assessment)
+    far = [c for c in CHANNELS if low[c] > LARGE_ERROR * expected[c]]
     assert judged.verdict == ("unknown" if far else "none")
     assert judged.decisions[-1].outcome == ("large" if far else "not large")
     assert bool(judged.notes) == bool(far)
@@ -99,9 +88,9 @@ def test_a_model_that_diverges_on_the_test_run_is_not_none():
     run = Recording("run", times, dict.fromkeys(CHANNELS, np.zeros(50)), "test")
     wild = assessed([np.full((50, 2), np.nan)], [run], dict(zip(CHANNELS, CHANNELS, strict=True)), SIGMA)
     lost = dict.fromkeys(CHANNELS, math.nan)
-    found = compared(lost, lost, {c: remainder(math.nan) for c in CHANNELS}, quality(), STILL, wild)
+    found = compared(lost, lost, lost, STILL, wild)
     assert found == Explained(None, {}, False, False)
-    judged = consistent(Judged("none", [], 1.0, []), found, {c: remainder(math.nan) for c in CHANNELS}, wild)
+    judged = consistent(Judged("none", [], 1.0, []), found, lost, wild)
     assert judged.verdict == "unknown" and "diverges" in judged.notes[-1]
     assert "diverges" in summary("unknown", [], [], [], found, 1.0)
 
@@ -111,10 +100,10 @@ def test_a_model_that_diverges_on_the_test_run_is_not_none():
 def test_the_share_is_that_of_the_excess_variance(before, after):
     """Claim: 1 − Σ(rms²−1 after)/Σ(rms²−1 before), above zero where the error falls, None without excess."""
     found, _, _ = explained(before, after)
-    was, left, _ = simulated(*before)
+    was, low, _ = simulated(*before)
     now, _, _ = simulated(*after, seed=1)
     excess = [sum(max(value**2 - 1.0, 0.0) for value in rms.values()) for rms in (was, now)]
-    if all(one.low <= 1.0 for one in left.values()):
+    if max(low.values()) <= 1.0:
         assert found.share is None
     else:
         assert found.share == pytest.approx(1.0 - excess[1] / excess[0])
@@ -122,12 +111,10 @@ def test_the_share_is_that_of_the_excess_variance(before, after):
     assert set(found.left) <= set(CHANNELS) and all(value > 1.1 for value in found.left.values())
 
 
-def test_noise_that_nobody_stated_is_the_white_part_of_the_recording():
-    """Claim: where σ is all that the baseline leaves, what falls below it to the white part counts as explained."""
-    unstated, _, _ = explained((1.0, 1.0), (0.5, 0.5), quality(estimated=True, white=0.5))
-    assert unstated.share > 0.9
-    stated, _, _ = explained((1.0, 1.0), (0.5, 0.5))
-    assert stated.share is None
+def test_noise_that_nobody_stated_is_the_white_part_of_what_is_left():
+    row = ChannelQuality("v", "m/s", 400, 0.0, 0.5, False, 0.1)
+    unstated = dataclasses.replace(row, sigma_estimated=True)
+    np.testing.assert_array_equal(noise([row, unstated]), [0.5, 0.1])
 
 
 def physics(**changes):

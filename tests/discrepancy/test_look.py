@@ -110,9 +110,13 @@ def test_what_is_random_is_as_large_as_many_simulations_are_off():
     off = np.stack([scipy.signal.lsim(system, one, times)[1] for one in force])
     taken = np.stack([(begun @ (fitted @ (one / [0.01, 0.02]).ravel())) * [0.01, 0.02] for one in off])
     off = off - taken
-    rms = np.sqrt(1.0 + np.mean((off / [0.01, 0.02]) ** 2, axis=(0, 1)))
-    np.testing.assert_allclose([*expected_errors(pushed(slow)).values()], rms, rtol=0.1)
-    assert [*expected_errors(pushed(30.0)).values()] == [1.0, 1.0]
+    stated = np.array([0.01, 0.02])
+    rms = np.sqrt(1.0 + np.mean((off / stated) ** 2, axis=(0, 1)))
+    np.testing.assert_allclose([*expected_errors(pushed(slow), stated).values()], rms, rtol=0.1)
+    assert [*expected_errors(pushed(30.0), stated).values()] == [1.0, 1.0]
+    # of half the noise random forces leave twice as much
+    halved = np.sqrt(1.0 + 4.0 * (rms**2 - 1.0))
+    np.testing.assert_allclose([*expected_errors(pushed(slow), 0.5 * stated).values()], halved, rtol=0.1)
 
 
 def test_searches_that_agree_are_one():
