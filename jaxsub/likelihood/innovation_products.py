@@ -12,7 +12,6 @@ $\bar E = K^T\lambda_f + u(\bar G + \bar G^T),\quad
 and P, X, C take their shares of these. Source: de Jong (1991), Ann. Statist. 19, for many columns at once.
 """
 
-import functools
 from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
@@ -125,14 +124,14 @@ def _filtered(
     q = steps.shown.shape[-1]
     pieces, length = _cut(steps.noise.shape[1], parts)
 
-    def met(run: Array, carry: tuple[Array, Array], k: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        carry, passed = _met(carry, _sample(steps, run, k))
-        return carry, (passed.white, jnp.sum(jnp.log(jnp.diagonal(passed.factor))))
+    def of_run(run: Steps) -> tuple[Array, Array, tuple[Array, Array]]:
+        def met(carry: tuple[Array, Array], k: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+            carry, passed = _met(carry, _sample(run, k))
+            return carry, (passed.white, jnp.sum(jnp.log(jnp.diagonal(passed.factor))))
 
-    def of_run(run: Array) -> tuple[Array, Array, tuple[Array, Array]]:
         def piece(carry: tuple, first: Array) -> tuple[tuple, tuple]:
             before, gram = carry
-            after, (white, logarithm) = jax.lax.scan(functools.partial(met, run), before, first + jnp.arange(length))
+            after, (white, logarithm) = jax.lax.scan(met, before, first + jnp.arange(length))
             flat = white.reshape(-1, q)
             return (after, gram + _squares(flat)), (jnp.sum(logarithm), before)
 
@@ -143,8 +142,8 @@ def _filtered(
         return jax.lax.scan(part, (begin, nothing), length * jnp.arange(parts * pieces).reshape(parts, pieces))[1]
 
     nothing = jnp.zeros((len(begin), q), steps.shown.dtype)
-    # one run after the other: products of three dimensions are slower than three of two
-    gram, logarithm, begun = jax.lax.map(of_run, jnp.arange(len(steps.noise)))
+    # side by side, since matrices this small cost what it takes to begin with each
+    gram, logarithm, begun = jax.vmap(of_run)(steps)
     return _mirrored(gram), logarithm, begun
 
 
@@ -164,10 +163,10 @@ def _mirrored(upper: Float[Array, "*m q q"]) -> Float[Array, "*m q q"]:
     return jnp.triu(upper) + jnp.swapaxes(jnp.triu(upper, 1), -1, -2)
 
 
-def _sample(steps: Steps, run: Array, k: Array) -> Steps:
-    """What a filter needs at sample `k` of a run: beyond the end nothing, with unit noise, that leads nowhere."""
-    at = jax.tree.map(lambda M: M[run, jnp.minimum(k, M.shape[1] - 1)], steps)
-    seen = lambda M, otherwise: jnp.where(k < steps.noise.shape[1], M, otherwise)
+def _sample(run: Steps, k: Array) -> Steps:
+    """What a filter needs at sample `k` of one run: beyond the end nothing, with unit noise, that leads nowhere."""
+    at = jax.tree.map(lambda M: M[jnp.minimum(k, len(M) - 1)], run)
+    seen = lambda M, otherwise: jnp.where(k < len(run.noise), M, otherwise)
     return at._replace(F=seen(at.F, 0.0), C=seen(at.C, 0.0), noise=seen(at.noise, 1.0), shown=seen(at.shown, 0.0))
 
 
@@ -187,15 +186,13 @@ def _back(kept: tuple[Steps, tuple[Array, Array]], given: tuple[Array, Array]) -
     """The adjoint, piece by piece from the last: what a piece met is worked out again from where it begins."""
     steps, begun = kept
     both, log_determinant = given[0] + given[0].T, given[1]
-    runs, samples, (z, q) = *steps.noise.shape[:2], begun[1].shape[-2:]
+    samples, (z, q) = steps.noise.shape[1], begun[1].shape[-2:]
     pieces, length = _cut(samples, 1)
 
-    def of_run(each: tuple[Array, tuple[Array, Array]]) -> tuple[Steps, Array]:
-        run, begun = each
-
+    def of_run(run: Steps, begun: tuple[Array, Array]) -> tuple[Steps, Array]:
         def piece(after: tuple[Array, Array], each: tuple[Array, tuple]) -> tuple[tuple[Array, Array], Steps]:
             first, before = each
-            at = jax.vmap(lambda k: _sample(steps, run, k))(first + jnp.arange(length))
+            at = jax.vmap(lambda k: _sample(run, k))(first + jnp.arange(length))
             passed = jax.lax.scan(_met, before, at)[1]
             return jax.lax.scan(
                 lambda carry, each: _back_step(carry, *each, both, log_determinant),
@@ -209,7 +206,7 @@ def _back(kept: tuple[Steps, tuple[Array, Array]], given: tuple[Array, Array]) -
         (_, weight), found = jax.lax.scan(piece, nothing, (firsts, begun), reverse=True)
         return jax.tree.map(lambda M: M.reshape(-1, *M.shape[2:])[:samples], found), weight
 
-    found, weights = jax.lax.map(of_run, (jnp.arange(runs), begun))
+    found, weights = jax.vmap(of_run)(steps, begun)
     forcing = None if found.forcing is None else found.forcing[:, :-1]
     return found._replace(forcing=forcing), jnp.sum(weights, axis=0)
 
