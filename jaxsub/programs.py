@@ -12,6 +12,7 @@ import pickle
 import types
 import uuid
 from collections.abc import Callable, Hashable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -25,6 +26,7 @@ from jax.core import Tracer
 from .fingerprint import NoDigestError, digest
 
 F = TypeVar("F", bound=Callable)
+R = TypeVar("R")
 
 # what takes the arrays of a call and returns what the function returns
 _Call = Callable[[Sequence[Any]], Any]
@@ -171,3 +173,21 @@ def _load_lapack() -> None:
     https://github.com/jax-ml/jax/issues/29610
     """
     jax.jit(jax.lax.linalg.cholesky).lower(jnp.eye(1))
+
+
+def cores() -> int:
+    """The cores that this process may run on: in a batch job or a container fewer than the machine has."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def on_cores(function: Callable[..., R], arguments: Sequence[tuple]) -> list[R]:
+    """`function` of each of the `arguments`, on as many threads as there are cores.
+
+    Of the first by itself: threads that trace the same program at once can crash JAX.
+    """
+    first, *rest = arguments
+    found = [function(*first)]
+    if not rest:
+        return found
+    with ThreadPoolExecutor(min(cores(), len(rest))) as threads:
+        return found + list(threads.map(lambda own: function(*own), rest))

@@ -2,7 +2,8 @@
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -39,7 +40,73 @@ _NUDGE = 0.1
 _AT_ONCE = 64
 
 
-def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple[Columns, list[list[int]]]:
+class Part(NamedTuple):
+    """A column where it acts: a force at both ends of each interval, or a change of channels, SI.
+
+    **Fields**: `at`: (m,) the equations or channels. `value`: (2, R, K-1, m) or (R, K, m) what it is there.
+    """
+
+    at: np.ndarray
+    value: np.ndarray
+
+    @classmethod
+    def of(cls, whole: np.ndarray) -> "Part":
+        """Of a column in all equations, or channels, the last axis."""
+        at = np.flatnonzero(whole.reshape(-1, whole.shape[-1]).any(axis=0))
+        return cls(at, np.ascontiguousarray(whole[..., at]))
+
+    @property
+    def is_force(self) -> bool:
+        """Whether it is a force, and no change of channels."""
+        return self.value.ndim == 4
+
+
+@dataclasses.dataclass(frozen=True)
+class EffectColumns:
+    """Columns of effects along the motion of a view, kept where they act.
+
+    Side by side in all states and channels hundreds of them take several times as much memory.
+    """
+
+    view: View
+    parts: tuple[Part, ...]
+
+    def __len__(self) -> int:
+        return len(self.parts)
+
+    def __add__(self, more: "EffectColumns") -> "EffectColumns":
+        """These and `more` of the same view after them."""
+        return dataclasses.replace(self, parts=self.parts + more.parts)
+
+    def picked(self, chosen: Sequence[int]) -> "EffectColumns":
+        """Some of the columns, in that order."""
+        return dataclasses.replace(self, parts=tuple(self.parts[i] for i in chosen))
+
+    def dense(self) -> Columns:
+        """The columns side by side, forces as what the view's system makes of them in each step."""
+        system = self.view.followed.system
+        made = Columns(np.zeros((*system.C.shape[:3], len(self))), np.zeros((*system.A.shape[:3], len(self))))
+        self.write(made, slice(None))
+        return made
+
+    def write(self, onto: Columns, runs: slice) -> None:
+        """Write what some of the runs have of the columns into zeros, a few at a time since copies take memory."""
+        system, sigma, forcing = self.view.followed.system, np.asarray(self.view.sigma), onto.forcing
+        G, measured = np.asarray(system.G[runs]), np.asarray(system.measured[runs])
+        forces = [i for i, part in enumerate(self.parts) if part.is_force]
+        for first in range(0, len(forces), _AT_ONCE):
+            some = forces[first : first + _AT_ONCE]
+            ends = np.zeros((2, *G.shape[:2], G.shape[-1] // 2, len(some)))
+            for place, i in enumerate(some):
+                ends[..., self.parts[i].at, place] = self.parts[i].value[:, runs]
+            assert forcing is not None
+            forcing[..., some] = G @ np.concatenate([*ends], axis=2)
+        for i, (at, value) in enumerate(self.parts):
+            if not self.parts[i].is_force:
+                onto.shown[..., at, i] = np.where(measured[..., at], value[runs] / sigma[at], 0.0)
+
+
+def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple[EffectColumns, list[list[int]]]:
     """The columns of all candidates, and which of them each candidate has.
 
     An effect with amplitudes has a column for each, its slope at zero. One with none, such as a lag, enters as the
@@ -52,26 +119,16 @@ def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple
     # forces come first
     free = {False: itertools.count(), True: itertools.count(len(forces))}
     owners = [[next(free[kind]) for _ in own] for own, kind in zip(made, shows, strict=True)]
-    return columns_of(view, forces, outputs), owners
+    return EffectColumns(view, (*forces, *outputs)), owners
 
 
-def columns_of(view: View, forces: Sequence[np.ndarray], outputs: Sequence[np.ndarray] = ()) -> Columns:
-    """Columns of forces at both ends of each interval, (2, R, K-1, n), then of changes of the channels, (R, K, c), SI.
-
-    They are written where they stay, some at a time: copies of hundreds would take several times their memory.
-    """
-    system, count = view.followed.system, len(forces) + len(outputs)
-    shown, forcing = np.zeros((*system.C.shape[:3], count)), np.zeros((*system.A.shape[:3], count))
-    G, measured = np.asarray(system.G), np.asarray(system.measured)
-    for first in range(0, len(forces), _AT_ONCE):
-        begin, end = np.stack(forces[first : first + _AT_ONCE], axis=-1)
-        forcing[..., first : first + begin.shape[-1]] = G @ np.concatenate([begin, end], axis=2)
-    for i, change in enumerate(outputs, len(forces)):
-        shown[..., i] = np.where(measured, change / np.asarray(view.sigma), 0.0)
-    return Columns(shown, forcing)
+def columns_of(view: View, forces: Sequence[np.ndarray], outputs: Sequence[np.ndarray] = ()) -> EffectColumns:
+    """Columns of forces at both ends of each interval, (2, R, K-1, n), then of changes of channels, (R, K, c), SI."""
+    return EffectColumns(view, tuple(map(Part.of, [*forces, *outputs])))
 
 
-def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[np.ndarray]]:
+@quietly
+def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[Part]]:
     """Each column of each effect, a force or a change of the channels."""
     tried = []
     for effect in effects:
@@ -79,18 +136,25 @@ def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[
         more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
         small = [with_numbers(effect, {name: _SMALL * (name == own) for name in names}) for own in names]
         tried.append(small or [effect, with_numbers(effect, more)])
-    made = iter(differences(view, [one for own in tried for one in own]))
+    # one after the other: only where they act are they kept
+    made = _differences(view, [one for own in tried for one in own])
     columns = []
     for effect, own in zip(effects, tried, strict=True):
         found = [next(made) for _ in own]
         slopes = amplitudes(effect)
-        columns.append([c / _SMALL for c in found] if slopes else [found[0], (found[1] - found[0]) / _NUDGE])
+        own = [c / _SMALL for c in found] if slopes else [found[0], (found[1] - found[0]) / _NUDGE]
+        columns.append([Part.of(column) for column in own])
     return columns
 
 
 @quietly
 def differences(view: View, effects: Sequence[AbstractEffect]) -> list[np.ndarray]:
     """What each of `effects` adds with its own parameters: a force (2, R, K-1, n), or to the channels (R, K, c)."""
+    return list(_differences(view, effects))
+
+
+def _differences(view: View, effects: Sequence[AbstractEffect]) -> Iterator[np.ndarray]:
+    """`differences`, one when it is asked for."""
     vehicle, path = view.vehicle, view.path
     forces = iter(actuator_forces(vehicle, path, [e for e in effects if isinstance(e, AbstractActuator)]))
     flows = iter(flow_forces(vehicle, path, [e for e in effects if isinstance(e, AbstractFlow)]))
@@ -112,7 +176,7 @@ def differences(view: View, effects: Sequence[AbstractEffect]) -> list[np.ndarra
             change[..., channels.index(channel)] = part
         return change
 
-    return [added(effect) for effect in effects]
+    return map(added, effects)
 
 
 def stacked_force(vehicle: AbstractVehicle, effect: AbstractForce, motion: Motion) -> np.ndarray:

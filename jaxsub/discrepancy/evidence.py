@@ -18,19 +18,22 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 from scipy.linalg import block_diag
 
 from ..arrays import aligned_zeros
 from ..estimate import estimate_disturbance
-from ..likelihood import Columns, Disturbance, padded_width, total_products
-from .columns import columns_of
+from ..likelihood import Columns, Disturbance, System, padded_width, total_products
+from ..programs import on_cores
+from .columns import EffectColumns, columns_of
 from .innovation_search import root_or_one
 from .settings import DISTURBANCE_SHARES, MOST_COLUMNS
 from .view import Parts, View
 
 # products that evidence begins with
 FIRST = len(DISTURBANCE_SHARES)
+# samples of a share of the runs, and bytes that columns may take which are kept from one pass to the next
+_SAMPLES, _MEMORY = 4096, 2**30
 
 
 class Gains(NamedTuple):
@@ -168,25 +171,27 @@ class Products:
 
 @dataclasses.dataclass(frozen=True)
 class Evidence:
-    """A view, its columns with those of all candidates, and their products.
+    """A view, the columns of all candidates, and their products.
 
     **Fields**
 
-    - `whole`: the residual, free parameters and q candidates, padded to the width of a program. `length`: (q,) that of
-      each candidate's column under the view's disturbance, of which `products` have them in units.
+    - `columns`: of the q candidates. `length`: (q,) that of each under the view's disturbance, of which `products` have
+      them in units.
+    - `shares`: the residual's, the free parameters' and the candidates' columns of shares of the runs, placed where
+      programs take them from; none where they would take much memory.
     """
 
     view: View
-    whole: Columns
+    columns: EffectColumns
     length: np.ndarray
     products: list[Products]
+    shares: tuple[Columns, ...]
 
     @classmethod
-    def of(cls, view: View, columns: Columns, disturbances: Sequence[Disturbance] = ()) -> "Evidence":
+    def of(cls, view: View, columns: EffectColumns, disturbances: Sequence[Disturbance] = ()) -> "Evidence":
         """Under the given disturbances, or shares of the view's."""
         own, known = view.disturbance, len(view.prior)
-        count = columns.shown.shape[-1]
-        raw = cls(view, _placed(view.base, columns), np.ones(count), [])
+        raw = cls(view, columns, np.ones(len(columns)), [], _kept(view, columns))
         first = raw.under(own)
         length = root_or_one(np.diag(first.gram)[known:])
         made = dataclasses.replace(raw, length=length)
@@ -203,11 +208,17 @@ class Evidence:
     def under(self, disturbance: Disturbance) -> Products:
         """The products under a disturbance."""
         system, prior, unit = self.view.followed.system, self.view.prior, self._unit
-        found, log_determinant = total_products(disturbance, system, self.whole)
-        gram = np.asarray(found)[: len(unit), : len(unit)] / np.outer(unit, unit)
+
+        def of(number: int, runs: slice) -> tuple[np.ndarray, float]:
+            columns = self.shares[number] if self.shares else _placed(self.view, self.columns, runs)
+            found, log_determinant = total_products(disturbance, system.share(runs), columns)
+            return np.asarray(found)[: len(unit), : len(unit)], float(log_determinant)
+
+        grams, log_determinants = zip(*on_cores(of, [*enumerate(_shares(system))]), strict=True)
+        gram = sum(grams) / np.outer(unit, unit)
         gram[: len(prior), : len(prior)] += prior
         samples = int(np.sum(np.asarray(system.measured)))
-        return Products(disturbance, gram, float(log_determinant), samples, len(prior))
+        return Products(disturbance, gram, sum(log_determinants), samples, len(prior))
 
     def predicted(self, chosen: Sequence[int], products: Products) -> Float[np.ndarray, " m"]:
         """Log probability of each part of the recordings by the others, which leave every number some room.
@@ -219,11 +230,8 @@ class Evidence:
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Evidence":
         """Of a view along the same path whose residual and free parameters are sums `keep` (1 + p, 1 + m) of these."""
-        candidates = jax.tree.map(
-            lambda own: np.asarray(own)[..., len(keep) : len(keep) + len(self.length)], self.whole
-        )
-        products = [one.seen_from(keep) for one in self.products]
-        return Evidence(view, _placed(view.base, candidates), self.length, products)
+        columns = dataclasses.replace(self.columns, view=view)
+        return Evidence(view, columns, self.length, [p.seen_from(keep) for p in self.products], _kept(view, columns))
 
     def estimate(self, chosen: Sequence[int], start: Disturbance) -> Products:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
@@ -238,14 +246,14 @@ class Evidence:
 
     def left(self, chosen: Sequence[int], products: Products) -> Columns:
         """The residual, less what free parameters and `chosen` take up of it according to `products`."""
-        weights = products.weights(chosen) / self._unit
-        return jax.tree.map(lambda column: (np.asarray(column)[..., : len(weights)] @ weights)[..., None], self.whole)
+        weights, known = products.weights(chosen), len(self.view.prior)
+        weights = np.concatenate([weights[:known], weights[[known + i for i in chosen]]])
+        beside = self.view.base + self.picked(chosen)
+        return jax.tree.map(lambda column: (column @ weights)[..., None], beside)
 
     def picked(self, chosen: Sequence[int]) -> Columns:
         """Some of the candidates' columns, of unit length."""
-        own = np.array(chosen, int)
-        at = len(self.view.prior) + own
-        return jax.tree.map(lambda column: np.asarray(column)[..., at] / self.length[own], self.whole)
+        return jax.tree.map(lambda column: column / self.length[list(chosen)], self.columns.picked(chosen).dense())
 
     def best(self, chosen: Sequence[int]) -> tuple[float, Products]:
         """The largest log evidence of `chosen` over the disturbances, and the products where it is."""
@@ -254,16 +262,38 @@ class Evidence:
         return values[best], self.products[best]
 
 
-def _placed(base: Columns, candidates: Columns) -> Columns:
-    """Both side by side, padded to the width of a program and placed where programs take them from, copied once."""
-    known, count = base.shown.shape[-1], candidates.shown.shape[-1]
+def _shares(system: System) -> list[slice]:
+    """Shares of the runs, alike in size, that are filtered one after the other or side by side on cores."""
+    runs, samples = system.measured.shape[:2]
+    count = -(-runs // max(1, _SAMPLES // samples))
+    size = -(-runs // count)
+    return [slice(first, first + size) for first in range(0, runs, size)]
 
-    def beside(own: np.ndarray, more: np.ndarray) -> Array:
-        whole = aligned_zeros((*own.shape[:-1], padded_width(known + count)))
-        whole[..., :known], whole[..., known : known + count] = own, more
-        return jax.device_put(whole)
 
-    return jax.tree.map(beside, base, candidates)
+def _kept(view: View, columns: EffectColumns) -> tuple[Columns, ...]:
+    """The shares' columns; none where they would take much memory, and are made each time."""
+    system = view.followed.system
+    rows = sum(M.shape[0] * M.shape[1] * M.shape[2] for M in (system.C, system.A))
+    width = padded_width(len(view.prior) + len(columns))
+    return tuple(_placed(view, columns, runs) for runs in _shares(system)) if 8 * rows * width < _MEMORY else ()
+
+
+def _placed(view: View, candidates: EffectColumns, runs: slice) -> Columns:
+    """A view's own columns and those of candidates in a share of the runs, padded to the width of a program.
+
+    They are placed where programs take them from, copied once. A share with fewer runs than the others has empty ones.
+    """
+    known, size = len(view.prior), runs.stop - runs.start
+
+    def beside(own: np.ndarray) -> np.ndarray:
+        whole = aligned_zeros((size, *own.shape[1:3], padded_width(known + len(candidates))))
+        whole[: len(own[runs]), ..., :known] = own[runs]
+        return whole
+
+    made = jax.tree.map(beside, view.base)
+    there = len(view.base.shown[runs])
+    candidates.write(jax.tree.map(lambda M: M[:there, ..., known : known + len(candidates)], made), runs)
+    return jax.tree.map(jax.device_put, made)
 
 
 def evidence_of(view: View) -> float:

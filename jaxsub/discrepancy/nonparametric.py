@@ -13,8 +13,8 @@ import numpy as np
 from scipy import special
 
 from ..effects import KNOTS, SmoothForce, with_numbers
-from ..likelihood import Columns, Disturbance, smoothed
-from .columns import columns_of
+from ..likelihood import Disturbance, smoothed
+from .columns import EffectColumns, columns_of
 from .evidence import Evidence, Products, conditional
 from .settings import FORCE_DISTURBANCE_SHARES, LENGTH_SCALES, MAJORITY, SIGNIFICANCE
 from .smoothness import FINE, Smooth, coarse, smoothest
@@ -104,7 +104,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
         for share in FORCE_DISTURBANCE_SHARES
     ]
     # one force after the other: products between forces are not needed
-    picked = chosen.picked(columns)
+    picked = chosen.columns.picked(columns)
     beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))
     made = (Evidence.of(view, beside(force), asked) for force in weighed)
     every = [_Weighed(found.products, found.length, len(columns)) for found in made]
@@ -169,12 +169,12 @@ class _Weighed:
         sums = products.sums(self.held, self.own, smooth.weights)
         return products.mixed(sums, products.known), sums, smooth
 
-    def predicts(self, view: View, columns: Columns) -> bool:
+    def predicts(self, view: View, columns: EffectColumns) -> bool:
         """Whether the force improves the prediction of parts of the recordings, under the best disturbance of each.
 
         The products are of these `columns`: those of all forces would take much memory.
         """
-        whole = view.base + jax.tree.map(lambda column: column / self.unit, columns)
+        whole = view.base + jax.tree.map(lambda column: column / self.unit, columns.dense())
         found = [self._predicted(products, view.products(whole, products.disturbance)) for products in self.products]
         with_it, without = zip(*found, strict=True)
         return max(with_it) > max(without)

@@ -2,7 +2,6 @@
 
 import abc
 import dataclasses
-import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol, TypeVar, runtime_checkable
@@ -15,7 +14,7 @@ import optimistix as optx
 from jax.sharding import Mesh, PartitionSpec
 from jaxtyping import Array, Bool, Float, Int
 
-from ..programs import compiled
+from ..programs import compiled, cores
 from ..results import NONFINITE, RESULTS
 from .pool import pool
 from .problem import Problem
@@ -213,12 +212,7 @@ def share_for(problem: Problem) -> int:
 def shares_at_once() -> int:
     """How many shares are worked on side by side: one on each device, and on a single CPU one on each core."""
     devices = jax.local_device_count()
-    return _cores() if devices == 1 and jax.default_backend() == "cpu" else devices
-
-
-def _cores() -> int:
-    """The cores that this process may run on: in a batch job or a container fewer than the machine has."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores() if devices == 1 and jax.default_backend() == "cpu" else devices
 
 
 def _room() -> tuple[float, int]:

@@ -75,6 +75,19 @@ class System(eqx.Module):
         intervals = jnp.where(runs.live, runs.steps[runs.step_of], 0.0)
         return cls(model.A, model.G, C, runs.mask, intervals, start_std)
 
+    def share(self, runs: slice) -> "System":
+        """Some of the runs, and beyond the last one such in which nothing is measured. Not to be called in `jit`."""
+        size = runs.stop - runs.start
+        if size == len(self.intervals):
+            return self
+
+        def some(M: Array) -> Array:
+            found = np.asarray(M)[runs]
+            return jax.device_put(np.pad(found, [(0, size - len(found)), *[(0, 0)] * (found.ndim - 1)]))
+
+        A, G, C, measured, intervals = map(some, (self.A, self.G, self.C, self.measured, self.intervals))
+        return System(A, G, C, measured, intervals, self.start_std)
+
 
 class Columns(eqx.Module):
     """What residuals are linear in, column by column; the residual itself is one.

@@ -66,7 +66,7 @@ def named_effects(model: WatchedModel, recent: Recent, since: float) -> list[dic
     effects = [effect for effect in candidates(facts(view)) if _TIMED not in parameter_table(effect)]
     columns, owners = candidate_columns(view, effects)
     late = np.stack(recent.rows)[:, 0] >= since
-    products, length = _products(view, columns, np.pad(late, (0, view.runs.times.shape[1] - len(late))))
+    products, length = _products(view, columns.dense(), np.pad(late, (0, view.runs.times.shape[1] - len(late))))
     gains = products.gains([], owners)
     probability = softmax([0.0, *np.nan_to_num(gains.evidence, nan=-np.inf)])[1:]
     order = np.argsort(-probability)[:_LISTED]

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from jaxsub.effects.hull import CrossflowDrag
 from jaxsub.effects.sensor_mounting import SensorLeverArm
 from jaxsub.effects.sensors import SensorScale
 from jaxsub.estimate import batch, fit
-from jaxsub.likelihood import Disturbance, whitened
+from jaxsub.likelihood import Disturbance, total_products, whitened
 
 
 @pytest.fixture(scope="module")
@@ -86,10 +87,35 @@ def test_gains_on_top_of_chosen_ones_are_differences_of_evidence(dense):
     np.testing.assert_allclose(gains.evidence, expected, rtol=1e-9)
 
 
+def test_shares_of_the_runs_have_the_sum_of_the_whole():
+    """Claim: products of 15 runs, filtered in two shares of which one has an empty run, are those of one pass.
+
+    Whether the columns of the shares are kept or made anew; and a sum of columns is that of the dense ones.
+    """
+    view = look(fit(wrong(), batch(wrong(), 5 * recorded(None, 1))))
+    columns, _ = candidate_columns(view, candidates(facts(view), (CrossflowDrag, SensorScale)))
+    evidence = Evidence.of(view, columns, [view.disturbance])
+    assert len(evidence.shares) == 2 and len(evidence.shares[0].shown) == 8
+    whole = view.base + columns.dense()
+    gram, log_determinant = total_products(view.disturbance, view.followed.system, whole)
+    unit = np.concatenate([np.ones(len(view.prior)), evidence.length])
+    expected = np.asarray(gram) / np.outer(unit, unit)
+    expected[: len(view.prior), : len(view.prior)] += view.prior
+    for found in (evidence, dataclasses.replace(evidence, shares=())):
+        products = found.under(view.disturbance)
+        np.testing.assert_allclose(products.gram, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+        assert products.log_determinant == pytest.approx(float(log_determinant), rel=1e-12)
+    chosen = [len(columns) - 1, 0]
+    weights = products.weights(chosen) / unit
+    left = evidence.left(chosen, products)
+    for found, dense in zip(jax.tree.leaves(left), jax.tree.leaves(whole), strict=True):
+        np.testing.assert_allclose(found[..., 0], dense @ weights, rtol=1e-9, atol=1e-9)
+
+
 def test_statistic_is_chi_square_where_nothing_is_left_out(clean):
     effects = [e for e in candidates(facts(clean)) if e.family in ("hull", "hydrostatics", "sensors")]
     columns, owners = candidate_columns(clean, effects)
-    base = clean.base + columns
+    base = clean.base + columns.dense()
     white = np.array(whitened(clean.disturbance, clean.followed.system, base)[0]).reshape(-1, base.shown.shape[-1])
     measured = np.asarray(clean.followed.system.measured).ravel()
     rng, draws = np.random.default_rng(2), []
@@ -170,7 +196,7 @@ def test_an_instrument_is_one_column_in_all_its_channels_and_its_trace_is_theirs
     columns, owners = candidate_columns(clean, [Gain()])
     assert owners == [[0]]
     channels = clean.vehicle.layout.channels
-    shown = np.asarray(columns.shown)[..., 0] * np.asarray(clean.sigma)
+    shown = columns.dense().shown[..., 0] * np.asarray(clean.sigma)
     for i, channel in enumerate(channels):
         expected = clean.path.true[channel] if channel in ("w", "q") else 0.0
         np.testing.assert_allclose(shown[..., i], np.where(clean.runs.mask[..., i], expected, 0.0), atol=1e-12)
