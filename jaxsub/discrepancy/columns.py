@@ -92,14 +92,15 @@ class EffectColumns:
     def write(self, onto: Columns, runs: slice) -> None:
         """Write what some of the runs have of the columns into zeros, a few at a time since copies take memory."""
         system, sigma, forcing = self.view.followed.system, np.asarray(self.view.sigma), onto.forcing
-        G, measured = np.asarray(system.G[runs]), np.asarray(system.measured[runs])
+        assert forcing is not None
+        # by NumPy: to cut arrays of JAX would be a program for each place
+        G, measured = np.asarray(system.G)[runs], np.asarray(system.measured)[runs]
         forces = [i for i, part in enumerate(self.parts) if part.is_force]
         for first in range(0, len(forces), _AT_ONCE):
             some = forces[first : first + _AT_ONCE]
             ends = np.zeros((2, *G.shape[:2], G.shape[-1] // 2, len(some)))
             for place, i in enumerate(some):
                 ends[..., self.parts[i].at, place] = self.parts[i].value[:, runs]
-            assert forcing is not None
             forcing[..., some] = G @ np.concatenate([*ends], axis=2)
         for i, (at, value) in enumerate(self.parts):
             if not self.parts[i].is_force:
