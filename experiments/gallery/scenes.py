@@ -132,4 +132,5 @@ def facts(vehicle: AbstractVehicle, recording: Recording, shown: Mapping[str, np
         tones={} if rig else dict.fromkeys(layout.equations, (0.9,)),
         frequencies=1,
         fixed_gains=tuple(commands),
+        speed=float(vehicle.values().get("speed", 0.0)),
     )

@@ -71,8 +71,8 @@ def _described(
 def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Selector) -> Model | None:
     """The model with the terms that explain most of its simulation error, if they are accepted.
 
-    Terms with inadmissible fitted parameters are replaced by others. Of terms that are rejected only the first half is
-    tried again.
+    Terms with inadmissible fitted parameters are left out, and where none of them is admissible others are tried. Of
+    terms that are rejected only the first half is tried again.
     """
     asked = largest_in_simulation(selector)
     for _ in range(SURROGATE_FITS):
@@ -82,7 +82,7 @@ def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Select
         wrong = {effect.label for effect in asked if not is_admissible(more.fit, [effect])}
         if wrong:
             selector.usable[[effect.label in wrong for effect in selector.candidates]] = False
-            asked = largest_in_simulation(selector)
+            asked = [effect for effect in asked if effect.label not in wrong] or largest_in_simulation(selector)
         elif _worth(model, more):
             return more
         else:

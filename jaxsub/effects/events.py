@@ -91,11 +91,15 @@ class ThrustLoss(AbstractForce):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[ThrustLoss]":
-        """A body free in surge, at times over the run."""
+        """A body free in surge, at times over the run; of constant thrust, one that operates at a speed.
+
+        What ballast drives has no thrust to lose.
+        """
         if facts.kind != "submerged-body" or "surge" not in facts.equations:
             return []
-        of = "thrust" if "thrust" in facts.actuators else [*facts.propulsion, "constant"][0]
-        return [cls(of, facts.sample_interval, t_0=number(t)) for t in _grid(facts)]
+        constant = ("constant",) if facts.speed != 0.0 else ()
+        by = ("thrust",) if "thrust" in facts.actuators else (*facts.propulsion, *constant)
+        return [cls(of, facts.sample_interval, t_0=number(t)) for of in by[:1] for t in _grid(facts)]
 
     @property
     def where(self) -> tuple[str, ...]:

@@ -126,6 +126,7 @@ class Facts(eqx.Module):
     - `equations`: the free equations of motion.
     - `actuators`, `channels`, `environment`: names of what is recorded.
     - `length`, `diameter`: of the hull, m (zero for a mechanism). `density`: of the water that it was made for, kg/m³.
+    - `speed`: that it operates at, m/s; zero of what nothing drives.
     - `rate_scale`: rms velocity of each free equation along the recordings.
     - `sample_interval`: the recordings' median, s. `duration`: of the longest, s.
     - `position_scale`: largest size of each coordinate of a mechanism.
@@ -163,6 +164,7 @@ class Facts(eqx.Module):
     has: frozenset[str] = frozenset()
     fixed_gains: tuple[str, ...] = ()
     density: float = STANDARD_DENSITY
+    speed: float = 0.0
 
     @property
     def shown(self) -> dict[str, str]:

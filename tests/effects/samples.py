@@ -32,6 +32,7 @@ def facts(kind="submerged-body", equations=EQUATIONS, actuators=("rudder", "elev
         kind, tuple(equations), tuple(actuators), channels, ("temperature", "altitude"), 2.0, 0.2, rates, 0.1,
         60.0, {} if kind == "submerged-body" else places, inputs, outputs, (0.3, 4.0),
         dict.fromkeys(equations, (0.9, 2.1)), 150, fixed_gains=tuple(actuators),
+        speed=1.2 if kind == "submerged-body" else 0.0,
     )  # fmt: skip
 
 

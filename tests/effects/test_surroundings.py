@@ -152,7 +152,8 @@ def test_candidates_of_the_propeller_need_its_recording():
         ("sway", "rudder"), ("yaw", "rudder"), ("heave", "elevator"), ("pitch", "elevator")
     }  # fmt: skip
     assert {e.of for e in ThrustLoss.candidates(silent)} == {"constant"}
-    assert ThrustLoss.candidates(RIG) == []
+    # a glider has no propeller, and no speed without ballast
+    assert ThrustLoss.candidates(dataclasses.replace(silent, speed=0.0)) == ThrustLoss.candidates(RIG) == []
 
 
 def test_turning_loses_speed_by_every_product_of_the_textbook_and_no_square_propels():
