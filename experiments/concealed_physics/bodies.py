@@ -59,7 +59,7 @@ def start_state(name: str, vehicle: AbstractVehicle, rng: np.random.Generator) -
     layout = vehicle.layout
     if name == "rig":
         return 0.1 * rng.uniform(-1.0, 1.0, 2)
-    ahead = {"surge": float(vehicle.own_values()["speed"])}
+    ahead = {"surge": vehicle.speed}
     placed = {"z": _DEPTH.get(name, 15.0) + rng.uniform(-1.0, 1.0), "psi": rng.uniform(-3.0, 3.0)}
     rates = [ahead.get(e, 0.0) for e in layout.equations]
     return np.array(rates + [placed.get(p, 0.0) for p in layout.positions])

@@ -59,8 +59,7 @@ def _regression(vehicle: AbstractVehicle, recording: Recording, library: list[Tr
     layout = vehicle.layout
     columns = recording.columns
     n, count = len(layout.equations), len(recording.times)
-    cruise = float(vehicle.own_values().get("speed", 0.0))
-    rest = {"surge": cruise}
+    rest = {"surge": vehicle.speed}
     rate = lambda e: columns.get(VELOCITIES.get(e, ""), columns.get(f"{e}_rate", np.full(count, rest.get(e, 0.0))))
     nu = np.stack([rate(e) for e in layout.equations], axis=1)
     eta = np.stack([columns.get(p, np.zeros(count)) for p in layout.positions], axis=1)

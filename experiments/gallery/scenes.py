@@ -103,7 +103,7 @@ def stage(name: str) -> tuple[AbstractVehicle, Recording, np.ndarray]:
     }
     columns = {c: columns[c] for c in (*layout.held, *layout.interpolated)}
     start = dict.fromkeys((*layout.equations, *layout.positions), 0.0)
-    start |= {"surge": float(vehicle.own_values()["speed"]), "z": _DEPTH.get(name, 10.0)}
+    start |= {"surge": vehicle.speed, "z": _DEPTH.get(name, 10.0)}
     return vehicle, Recording(name, t, columns, name), np.array(list(start.values()))
 
 
@@ -132,5 +132,5 @@ def facts(vehicle: AbstractVehicle, recording: Recording, shown: Mapping[str, np
         tones={} if rig else dict.fromkeys(layout.equations, (0.9,)),
         frequencies=1,
         fixed_gains=tuple(commands),
-        speed=float(vehicle.values().get("speed", 0.0)),
+        speed=vehicle.speed,
     )

@@ -57,12 +57,11 @@ def check(vehicle: AbstractVehicle, recordings: Recordings, held_out: Recordings
     """
     recordings, held_out = listed(recordings), listed(held_out)
     layout = vehicle.layout
-    speed = float(vehicle.own_values().get("speed", 0.0))
     every = [*recordings, *held_out]
     known = {name for recording in every for name in recording.columns}
     mended, found = [], [*vehicle_findings(vehicle, layout.name), *duplicates(recordings, held_out)]
     for recording in every:
-        parts, findings = _run(recording, layout, known, speed)
+        parts, findings = _run(recording, layout, known, vehicle.speed)
         mended.append(parts)
         found += findings
     if not any(finding.severity == "error" for finding in found):

@@ -82,7 +82,7 @@ class Depth(eqx.Module):
             raise InputError(vehicle.layout.name, "has no depth to hold", "free its heave and pitch")
         pitch = axis(vehicle, ("heave", "pitch"), "theta", dict.fromkeys(fins, 1.0), "M_delta_e or M_delta_s")
         inner = angle_loop(pitch, _PART * pitch.swiftness, _RESERVE * float(limits.amplitude))
-        pace, speed = pitch.natural / 7.0, float(vehicle.own_values()["speed"])
+        pace, speed = pitch.natural / 7.0, vehicle.speed
         outer = Loop.of(-pace / speed, -0.5 * pace**2 / speed)
         return cls(number(pace), outer, inner, number(float(pitch_limit)), fins)
 

@@ -237,7 +237,7 @@ def facts(view: View) -> Facts:
         has=view.vehicle.has,
         fixed_gains=view.vehicle.fixed_gains,
         density=view.vehicle.density,
-        speed=float(view.vehicle.values().get("speed", 0.0)),
+        speed=view.vehicle.speed,
     )
 
 

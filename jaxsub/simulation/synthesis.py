@@ -20,7 +20,7 @@ States = Callable[[AbstractVehicle, Runs, Array], Array]
 def at_rest(vehicle: AbstractVehicle, count: int) -> Float[Array, "r s"]:
     """`count` initial states (R, s) of `vehicle`, SI: at rest at the origin, a body at its operating speed."""
     layout = vehicle.layout
-    ahead = [float(vehicle.own_values()["speed"]) if _is_surge(vehicle, e) else 0.0 for e in layout.equations]
+    ahead = [vehicle.speed if _is_surge(vehicle, e) else 0.0 for e in layout.equations]
     return jnp.tile(jnp.asarray(ahead + [0.0] * len(layout.positions)), (count, 1))
 
 

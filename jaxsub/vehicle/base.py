@@ -88,6 +88,11 @@ class AbstractVehicle(eqx.Module):
         return STANDARD_DENSITY
 
     @property
+    def speed(self) -> float:
+        """The operating speed, m/s; zero of what has none."""
+        return 0.0
+
+    @property
     @abc.abstractmethod
     def fixed_gains(self) -> tuple[str, ...]:
         """The actuators whose force no free number of its own scales as a whole (`Facts.fixed_gains`)."""

@@ -164,6 +164,11 @@ class SubmergedBody(AbstractVehicle):
         return self.restoring.reference_density
 
     @property
+    def speed(self) -> float:
+        """U_c."""
+        return float(self.cruise)
+
+    @property
     def fixed_gains(self) -> tuple[str, ...]:
         """The devices whose `gain` is not free, and inputs of which not every coefficient is."""
         return self.actuation.fixed_gains(self.layout)
