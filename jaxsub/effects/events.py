@@ -91,15 +91,14 @@ class ThrustLoss(AbstractForce):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[ThrustLoss]":
-        """A body free in surge, at times over the run; of constant thrust, one that operates at a speed.
+        """A body that is driven and free in surge, at times over the run; of a constant thrust where none is recorded.
 
         What ballast drives has no thrust to lose.
         """
-        if facts.kind != "submerged-body" or "surge" not in facts.equations:
+        if facts.kind != "submerged-body" or "surge" not in facts.equations or not facts.driven:
             return []
-        constant = ("constant",) if facts.speed != 0.0 else ()
-        by = ("thrust",) if "thrust" in facts.actuators else (*facts.propulsion, *constant)
-        return [cls(of, facts.sample_interval, t_0=number(t)) for of in by[:1] for t in _grid(facts)]
+        of = next((name for name in ("thrust", "shaft_speed") if name in facts.propulsion), "constant")
+        return [cls(of, facts.sample_interval, t_0=number(t)) for t in _grid(facts)]
 
     @property
     def where(self) -> tuple[str, ...]:

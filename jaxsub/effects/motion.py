@@ -126,7 +126,7 @@ class Facts(eqx.Module):
     - `equations`: the free equations of motion.
     - `actuators`, `channels`, `environment`: names of what is recorded.
     - `length`, `diameter`: of the hull, m (zero for a mechanism). `density`: of the water that it was made for, kg/m³.
-    - `speed`: that it operates at, m/s; zero of what nothing drives.
+    - `speed`: that it operates at, m/s; zero of what has none.
     - `rate_scale`: rms velocity of each free equation along the recordings.
     - `sample_interval`: the recordings' median, s. `duration`: of the longest, s.
     - `position_scale`: largest size of each coordinate of a mechanism.
@@ -197,5 +197,11 @@ class Facts(eqx.Module):
 
     @property
     def propulsion(self) -> tuple[str, ...]:
-        """The actuators of a body that push."""
+        """The actuators of a body that push, by the names that are for it."""
         return tuple(name for name in PROPULSION if self.kind == "submerged-body" and name in self.actuators)
+
+    @property
+    def driven(self) -> bool:
+        """Whether an actuator pushes in surge, such as a thruster by a name of its own, or it operates at a speed."""
+        pushes = any(f"B_surge_{name}" in self.has for name in self.actuators)
+        return bool(self.propulsion) or pushes or self.speed != 0.0

@@ -26,6 +26,7 @@ from jaxsub.effects import (
     looked_at,
     wave_band,
 )
+from jaxsub.vehicle import catalogue
 
 NOW = motion(BODY, count=60)
 RATES = {e: np.asarray(NOW.rates[e]) for e in EQUATIONS}
@@ -152,8 +153,25 @@ def test_candidates_of_the_propeller_need_its_recording():
         ("sway", "rudder"), ("yaw", "rudder"), ("heave", "elevator"), ("pitch", "elevator")
     }  # fmt: skip
     assert {e.of for e in ThrustLoss.candidates(silent)} == {"constant"}
-    # a glider has no propeller, and no speed without ballast
-    assert ThrustLoss.candidates(dataclasses.replace(silent, speed=0.0)) == ThrustLoss.candidates(RIG) == []
+    assert ThrustLoss.candidates(RIG) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "of"),
+    [
+        ("bluerov2_heavy", {"constant"}),  # four vectored thrusters by names of their own, at no speed
+        ("seaglider", set()),  # ballast alone
+        ("nps_auv_ii", {"constant"}),  # at a speed, of a propulsion that is not recorded
+        ("kvlcc2", {"shaft_speed"}),
+    ],
+)
+def test_thrust_is_lost_by_what_an_actuator_pushes_or_what_operates_at_a_speed(name, of):
+    """Claim: thrust loss is offered to published vehicles whose thrusters or speed say that they are driven."""
+    vehicle = getattr(catalogue, name)()
+    actuators = tuple(name for name, _ in vehicle.layout.inputs)
+    known = facts(equations=vehicle.layout.equations, actuators=actuators)
+    known = dataclasses.replace(known, has=vehicle.has, speed=vehicle.speed)
+    assert {effect.of for effect in ThrustLoss.candidates(known)} == of
 
 
 def test_turning_loses_speed_by_every_product_of_the_textbook_and_no_square_propels():
