@@ -51,7 +51,7 @@ def estimates(fit: Solution, said: Identifiability | None, coloured: Coloured | 
     unit = {row.name: row.unit for row in fit.vehicle.layout.free}
     white, values, at_bound = fit.standard_errors, dict(fit.values), {*fit.at_bound}
     wide = coloured.standard_errors if coloured else {}
-    for tied in tied_numbers(fit):
+    for tied in said.tied_numbers if said else tied_numbers(fit):
         values[tied.name], unit[tied.name] = tied.value, tied.unit
         white[tied.name] = tied.error(np.asarray(fit.covariance))
         if coloured:

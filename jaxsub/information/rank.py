@@ -1,7 +1,7 @@
 """What the recordings say about each coefficient, why they say no more, and what would help."""
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Literal
 
 import numpy as np
@@ -11,7 +11,7 @@ from ..likelihood.blocks import Watch, nobody
 from .directions import FRACTION, Directions, subset
 from .equivalence import Family, equivalent_systems
 from .excitation import Excitation
-from .tied import tied_numbers
+from .tied import TiedNumber, tied_numbers
 
 # what is said of a number that follows from coefficients that leave it open
 FOLLOWS = "left open by its expression"
@@ -77,7 +77,8 @@ class Identifiability:
     - `null_directions`: for each direction left open, the relative change of each coefficient that matters in it.
     - `uncertainty`: of each direction, in the coefficients' own sizes, the worst first.
     - `verdicts`: one a coefficient. `families`: the equivalent systems behind them, none where no direction is open.
-    - `tied`: one for each number that follows from coefficients, of which its `partners` are those.
+    - `tied`: one for each number that follows from coefficients, of which its `partners` are those. `tied_numbers`:
+      these numbers.
     """
 
     rank: int
@@ -87,6 +88,7 @@ class Identifiability:
     verdicts: tuple[CoefficientVerdict, ...] = ()
     families: tuple[Family, ...] = ()
     tied: tuple[CoefficientVerdict, ...] = ()
+    tied_numbers: tuple[TiedNumber, ...] = ()
 
     def __repr__(self) -> str:
         return "\n".join(self.sentences())
@@ -113,11 +115,12 @@ def identifiability(fit: Solution, assessment: Assessment | None = None, watch: 
     """
     if not fit.names:
         return Identifiability(0, 0, [], [])
+    numbers = tied_numbers(fit)
     if not np.all(np.isfinite(np.asarray(fit.model.products))):
         unknown = tuple(
             CoefficientVerdict(n, "not converged", np.inf, remedy=_OF_ALL["not converged"]) for n in fit.names
         )
-        return Identifiability(0, len(fit.names), [], [], unknown)
+        return Identifiability(0, len(fit.names), [], [], unknown, tied_numbers=numbers)
     directions = Directions.of(fit, watch)
     open_ = np.flatnonzero(directions.open)
     null = []
@@ -128,8 +131,8 @@ def identifiability(fit: Solution, assessment: Assessment | None = None, watch: 
     assessment = assess(fit) if assessment is None else assessment
     verdicts = tuple(_withheld(verdict, fit, assessment) for verdict in _verdicts(fit, directions, families))
     p = len(fit.names)
-    tied = tuple(_withheld(verdict, fit, assessment) for verdict in _tied_verdicts(fit, directions))
-    return Identifiability(p - len(open_), p, null, directions.uncertainty.tolist(), verdicts, families, tied)
+    tied = tuple(_withheld(verdict, fit, assessment) for verdict in _tied_verdicts(numbers, fit, directions))
+    return Identifiability(p - len(open_), p, null, directions.uncertainty.tolist(), verdicts, families, tied, numbers)
 
 
 def identifiable_subset(fit: Solution) -> tuple[str, ...]:
@@ -172,9 +175,11 @@ def _verdicts(fit: Solution, directions: Directions, families: tuple[Family, ...
     return tuple(made)
 
 
-def _tied_verdicts(fit: Solution, directions: Directions) -> Iterator[CoefficientVerdict]:
+def _tied_verdicts(
+    numbers: Iterable[TiedNumber], fit: Solution, directions: Directions
+) -> Iterator[CoefficientVerdict]:
     """Of each number that follows from coefficients, whether these are known well enough for it."""
-    for tied in tied_numbers(fit):
+    for tied in numbers:
         error = np.inf if {*tied.ends} & {*fit.at_bound} else directions.error_of(tied.slope * directions.size)
         relative = error / abs(tied.value) if tied.value else np.inf
         if relative <= FRACTION:
