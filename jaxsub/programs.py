@@ -180,14 +180,17 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def on_cores(function: Callable[..., R], arguments: Sequence[tuple]) -> list[R]:
-    """`function` of each of the `arguments`, on as many threads as there are cores.
+def on_cores(
+    function: Callable[..., R], arguments: Sequence[tuple], threads: int | None = None, ready: bool = False
+) -> list[R]:
+    """`function` of each of the `arguments`, on so many `threads`, by default as many as there are cores.
 
-    Of the first by itself: threads that trace the same program at once can crash JAX.
+    Of the first by itself, unless the function is `ready` compiled: threads that trace the same program at once can
+    crash JAX.
     """
-    first, *rest = arguments
-    found = [function(*first)]
-    if not rest:
+    alone = 0 if ready else 1
+    found = [function(*own) for own in arguments[:alone]]
+    if not (rest := arguments[alone:]):
         return found
-    with ThreadPoolExecutor(min(cores(), len(rest))) as threads:
-        return found + list(threads.map(lambda own: function(*own), rest))
+    with ThreadPoolExecutor(min(threads or cores(), len(rest))) as pool:
+        return found + list(pool.map(lambda own: function(*own), rest))

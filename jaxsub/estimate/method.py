@@ -2,8 +2,7 @@
 
 import abc
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import equinox as eqx
@@ -14,7 +13,7 @@ import optimistix as optx
 from jax.sharding import Mesh, PartitionSpec
 from jaxtyping import Array, Bool, Float, Int
 
-from ..programs import compiled, cores
+from ..programs import compiled, cores, on_cores
 from ..results import NONFINITE, RESULTS
 from .pool import pool
 from .problem import Problem
@@ -136,16 +135,11 @@ def in_shares(program: Program[T], method: Any, problem: Problem, starts: Array,
     if len(devices) > 1:
         parts = [_over_devices(program, method, problem, y, z) for y, z in rounds]
     else:
-        parts = _over_cores(program, method, problem, list(rounds))
+        rounds = list(rounds)
+        ready = program.lower(method, problem, *rounds[0]).compile()
+        own = lambda *part: jax.block_until_ready(ready(method, problem, *part))
+        parts = on_cores(own, rounds, shares_at_once(), ready=True)
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves)[:count], *parts)
-
-
-def _over_cores(program: Any, method: Any, problem: Problem, rounds: Sequence[tuple[Array, Any]]) -> list:
-    """A thread for each share. Compiled before: threads that trace the same program at once can crash JAX."""
-    ready = program.lower(method, problem, *rounds[0]).compile()
-    own = lambda part: jax.block_until_ready(ready(method, problem, *part))
-    with ThreadPoolExecutor(shares_at_once()) as threads:
-        return list(threads.map(own, rounds))
 
 
 @compiled
