@@ -8,9 +8,9 @@ from jaxtyping import Bool, Float
 from ..effects import Motion, by_name
 from .diagnosis import Regime
 from .settings import LEVEL, REGIME_AREA, REGIME_SHARE
+from .spline_basis import STILL
 
 _SHIFTS = 199  # of the test by chance
-_STILL = 1e-9
 INCIDENCE = ("attack", "sideslip")  # angles of the flow, rad
 
 Variables = Mapping[str, Float[np.ndarray, "r k"]]
@@ -23,7 +23,7 @@ def regime_variables(motion: Motion) -> dict[str, Float[np.ndarray, "r k"]]:
     if len(flow) == 3:
         u, v, w = np.broadcast_arrays(*flow)
         named |= {"speed": np.sqrt(u**2 + v**2 + w**2), **dict(zip(INCIDENCE, np.arctan2([w, v], u), strict=True))}
-    moving = {name: value for name, value in named.items() if np.ndim(value) == 2 and np.std(value) > _STILL}
+    moving = {name: value for name, value in named.items() if np.ndim(value) == 2 and np.std(value) > STILL}
     signed = {name: np.min(value) < 0.0 < np.max(value) for name, value in moving.items()}
     return {f"abs({name})" if signed[name] else name: np.abs(v) if signed[name] else v for name, v in moving.items()}
 

@@ -73,10 +73,9 @@ MAJOR_SHARE: Final[float] = 0.2
 SIMULATION_RATIO: Final[float] = 2.0
 # squared simulation error that a chosen effect may leave, in units of what the best nonparametric force leaves
 FORCE_RATIO: Final[float] = 4.0
-# share of the log evidence gained by a set from which its best effect is first fitted by itself
+# share of a gain in log evidence that is nearly all of it: of a set's, from which its best effect is first fitted by
+# itself; of an effect's, which the linearised model without it must restore
 DOMINANT_SHARE: Final[float] = 0.9
-# share of an effect's log evidence that the linearised model without it may fail to restore
-LINEARISATION_LOSS: Final[float] = 0.1
 
 # Acceptance
 
@@ -146,8 +145,6 @@ NOISE_WINDOW: Final[int] = 50
 
 # Report
 
-# standard error over a coefficient's size from which it is weakly identified
-WEAK_ERROR: Final[float] = 0.5
 # standard error over a coefficient's size from which it is not excited
 UNEXCITED_ERROR: Final[float] = 5.0
 # correlation of two estimates from which it is reported

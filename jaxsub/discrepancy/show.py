@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..estimate import Solution
+from ..information.directions import FRACTION
 from ..recording import Recording
 from .diagnosis import ChannelQuality, Coefficient, ParameterEstimate, RunQuality
-from .settings import CORRELATED, UNEXCITED_ERROR, WEAK_ERROR
+from .settings import CORRELATED, UNEXCITED_ERROR
 from .whiteness import record_sigma
 
 
@@ -53,7 +54,7 @@ def trades(fit: Solution, label: str) -> dict[str, float]:
 
 def _verdict(estimate: ParameterEstimate) -> str:
     ratio = estimate.standard_error / max(abs(estimate.value), 1e-300)
-    return "identified" if ratio < WEAK_ERROR else "weak" if ratio < UNEXCITED_ERROR else "not excited"
+    return "identified" if ratio < FRACTION else "weak" if ratio < UNEXCITED_ERROR else "not excited"
 
 
 def channel_quality(fit: Solution) -> list[ChannelQuality]:

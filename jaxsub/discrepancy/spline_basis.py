@@ -14,7 +14,8 @@ from .view import View
 
 # positions, of which no force is a function
 _LEFT_OUT = ("x", "y")
-_STILL = 1e-9
+# standard deviation, SI, below which what a variable does is rounding
+STILL = 1e-9
 # knots of the regression that picks a force
 _CHOOSING = 2 * (KNOTS - 1) + 1
 
@@ -26,7 +27,7 @@ def smooth_forces(view: View) -> list[SmoothForce]:
     found = []
     for name in starts:
         x = np.broadcast_to(np.asarray(starts[name]), live.shape)[live]
-        if name in _LEFT_OUT or name not in ends or not np.std(x) > _STILL:
+        if name in _LEFT_OUT or name not in ends or not np.std(x) > STILL:
             continue
         low, high = (float(f"{edge:.6g}") for edge in np.percentile(x, [1.0, 99.0]))
         if high > low:

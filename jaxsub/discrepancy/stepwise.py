@@ -20,7 +20,7 @@ from .rivals import robust_log_evidence
 from .selector import Selector
 from .settings import (
     CLEAR_LOG_BAYES,
-    LINEARISATION_LOSS,
+    DOMINANT_SHARE,
     MOST_EFFECTS_ONE_STEP,
     MOST_REJECTIONS,
     RIVALS_FITTED,
@@ -134,7 +134,7 @@ class _Search:
             own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
             number = max(own, key=lambda i, value=scan.value: value[i])
             without, again = (selector.evidence.best(selector.columns(some))[0] for some in ([], [number]))
-            if np.isfinite(scan.value[number]) and whole - again < LINEARISATION_LOSS * (whole - without):
+            if np.isfinite(scan.value[number]) and whole - again < (1.0 - DOMINANT_SHARE) * (whole - without):
                 break
         if not np.isfinite(scan.value[number]):
             return one, []

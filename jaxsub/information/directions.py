@@ -20,6 +20,7 @@ from ..programs import compiled
 from ..recording.runs import Runs
 from .residual_disturbance import whitened_columns
 
+# standard error over a coefficient's size up to which it is identified
 FRACTION = 0.5
 # shares in a hidden direction below this are rounding
 _ZERO = 1e-6
