@@ -60,6 +60,18 @@ def test_memory_along_a_stored_motion_is_the_solution_of_its_equation(known, eff
     np.testing.assert_array_equal(before.positions[state][:, 0], 0.0)
 
 
+def test_memory_of_a_hull_follows_its_velocity_through_moving_water():
+    """Claim: adrift at 0.5 m/s in water that drifts with it, a hull has the memory of one in water at rest."""
+    effect = FluidMemory("sway", jnp.asarray(-2.0), jnp.asarray(0.6))
+    steps = np.stack([np.diff(TIMES)] * 2)
+    drift = {"sway": jnp.full(steps.shape, 0.5)}
+    adrift = [dataclasses.replace(one, water=drift) for one in ends(BODY, "sway", 0.5)]
+    ((moved, _),) = with_memories([effect], *adrift, steps)
+    ((still, _),) = with_memories([effect], *ends(BODY, "sway", 0.0), steps)
+    assert np.abs(still.positions["memory_sway"]).max() > 0.05
+    np.testing.assert_allclose(moved.positions["memory_sway"], still.positions["memory_sway"], atol=1e-12)
+
+
 @pytest.mark.parametrize(("known", "effect", "equation", "law", "offset"), CASES, ids=["bouc-wen", "sway", "surge"])
 def test_memory_of_the_admissible_sign_takes_power_out_of_a_motion_from_rest(known, effect, equation, law, offset):
     start, end = ends(known, equation, offset)
