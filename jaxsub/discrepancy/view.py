@@ -209,7 +209,6 @@ def facts(view: View) -> Facts:
     live = np.asarray(runs.live)
     rms = lambda values: max(float(np.sqrt(np.mean(np.asarray(values)[live] ** 2))), 1e-9)
     body = layout.kind == "submerged-body"
-    depth = np.asarray(path.seen.positions["z"]) if body else np.zeros(1)
     shown = {channel: view.measured(channel) for channel in layout.channels}
     duration, interval = float(np.max(np.sum(path.steps, axis=1))), float(np.median(path.steps[live]))
     shaking, frequencies = [], 0
@@ -230,7 +229,7 @@ def facts(view: View) -> Facts:
         position_scale={} if body else {q: float(np.max(np.abs(path.seen.positions[q]))) for q in layout.equations},
         input_range={name: _commanded(path, live, i) for i, (name, _) in enumerate(layout.inputs)},
         output_range={c: (float(values.min()), float(values.max())) for c, values in shown.items() if len(values)},
-        depth_range=(float(depth.min()), float(depth.max())),
+        depth_range=_depths(view) if body else (0.0, 0.0),
         tones=dict(zip(layout.equations, shaking, strict=False)),
         frequencies=frequencies,
         quantities=quantities_of(layout.outputs, body),
@@ -239,6 +238,14 @@ def facts(view: View) -> Facts:
         density=view.vehicle.density,
         speed=view.vehicle.speed,
     )
+
+
+def _depths(view: View) -> tuple[float, float]:
+    """Least and largest depth of a body, m, alike of one that neither heaves nor pitches."""
+    layout, depth = view.vehicle.layout, np.asarray(view.path.seen.positions["z"])
+    dives = {"heave", "pitch", "theta", "z"}.intersection([*layout.equations, *(name for name, _ in layout.prescribed)])
+    least = float(depth.min())
+    return least, float(depth.max()) if dives else least
 
 
 def _commanded(path: Trajectory, live: np.ndarray, column: int) -> tuple[float, float, float]:

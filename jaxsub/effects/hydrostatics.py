@@ -42,6 +42,10 @@ def _floats(facts: Facts) -> bool:
     return facts.kind == "submerged-body" and bool({"surge", "heave"} & set(facts.equations))
 
 
+def _dives(facts: Facts) -> bool:
+    return _floats(facts) and facts.depth_range[0] < facts.depth_range[1]
+
+
 class _ExtraBuoyancy(AbstractForce):
     """A change of displaced weight that the recorded ballast and density do not account for."""
 
@@ -138,8 +142,8 @@ class HullCompressibility(_ExtraBuoyancy):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[HullCompressibility]":
-        """One, for a body free in surge or heave."""
-        return [cls(density=facts.density)] if _floats(facts) else []
+        """One, for a body free in surge or heave that dives."""
+        return [cls(density=facts.density)] if _dives(facts) else []
 
     @property
     def expression(self) -> str:
@@ -164,8 +168,8 @@ class DensityStratification(_ExtraBuoyancy):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[DensityStratification]":
-        """One, for a floating body whose recordings hold no density."""
-        return [cls()] if _floats(facts) and "density" not in facts.environment else []
+        """One, for a body that dives and whose recordings hold no density."""
+        return [cls()] if _dives(facts) and "density" not in facts.environment else []
 
     @property
     def expression(self) -> str:

@@ -132,7 +132,7 @@ class Facts(eqx.Module):
     - `position_scale`: largest size of each coordinate of a mechanism.
     - `input_range`: rms, largest size and largest rate (per s) of each actuator's command.
     - `output_range`: least and largest of what was recorded of each channel.
-    - `depth_range`: least and largest depth, m.
+    - `depth_range`: least and largest depth, m; alike where it neither moves by itself nor is recorded.
     - `quantities`: of each output whose name does not say it, what it shows: `-v[m/s]` of a velocity to port.
     - `has`: what the vehicle contains of what an effect could say: names of `Derivative`s, `coriolis`, free scales and
       offsets of sensors such as `psi.offset`.
