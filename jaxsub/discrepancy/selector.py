@@ -182,10 +182,10 @@ class Selector:
         without = self.free.log_evidence([])
         return without + self.free.gains([], self.owners).evidence + self.prior, without
 
-    def freely_predicted(self, chosen: Sequence[int], index: int) -> tuple[AbstractEffect, bool]:
-        """A candidate with the parameters that simulation predicts beside `chosen`, and whether physics admits them."""
+    def predicted(self, chosen: Sequence[int], index: int, under: Products) -> tuple[AbstractEffect, bool]:
+        """A candidate with the parameters predicted beside `chosen`, and whether physics admits them."""
         own = self.owners[index]
-        size = self.free.gains(self.columns(chosen), [own]).amplitudes[0]
+        size = under.gains(self.columns(chosen), [own]).amplitudes[0]
         return predict(self.candidates[index], size / self.evidence.length[own])
 
     def lose_free_run(self) -> None:

@@ -15,6 +15,7 @@ from ..effects import AbstractEffect, AbstractInstrument, parameter_table
 from ..likelihood import Disturbance
 from .acceptance import Examination, Model, ModelFitter
 from .cross_validation import compare
+from .evidence import FIRST, Products
 from .examine import listed, weighed
 from .model import is_admissible, with_coloured_errors
 from .progress import OutOfTime
@@ -55,9 +56,9 @@ def _described(
     judged: Judged,
     vocabulary: tuple[type[AbstractEffect], ...] | None,
 ) -> tuple[Model, Judged]:
-    model, selector = named, found.selector
+    model, selector, fallen = named, found.selector, set[str]()
     for _ in range(SURROGATE_ROUNDS if found.unexplained else 0):
-        more = _with_more(fitter, named, model, selector)
+        more = _with_more(fitter, named, model, selector, fallen)
         if more is None:
             break
         model, selector = more, listed(more.view, vocabulary)
@@ -68,25 +69,31 @@ def _described(
     return _with_force(fitter, named, model, found, judged)
 
 
-def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Selector) -> Model | None:
-    """The model with the terms that explain most of its simulation error, if they are accepted.
+def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Selector, fallen: set[str]) -> Model | None:
+    """The model with terms that explain most of its error, if they are accepted: in simulation first, then one step on.
 
-    Terms with inadmissible fitted parameters are left out, and where none of them is admissible others are tried. Of
-    terms that are rejected only the first half is tried again.
+    A simulation that other causes have led far off proposes what imitates them, and under a larger disturbance an error
+    is told from them. Terms with inadmissible fitted parameters are left out for good, with their labels in
+    `fallen`, and where none of them is admissible others are tried. Of terms that are rejected only the first half is
+    tried again.
     """
-    asked = largest_in_simulation(selector)
-    for _ in range(SURROGATE_FITS):
-        if not asked:
-            return None
-        more = _fitted(fitter, named, model, asked, selector.evidence.best([])[1].disturbance)
-        wrong = {effect.label for effect in asked if not is_admissible(more.fit, [effect])}
-        if wrong:
-            selector.usable[[effect.label in wrong for effect in selector.candidates]] = False
-            asked = [effect for effect in asked if effect.label not in wrong] or largest_in_simulation(selector)
-        elif _worth(model, more):
-            return more
-        else:
-            asked = asked[: len(asked) // 2]
+    left_out = lambda: [effect.label in fallen for effect in selector.candidates]
+    selector.usable[left_out()] = False
+    fits, disturbance = 0, selector.evidence.best([])[1].disturbance
+    for products in (selector.free, *reversed(selector.evidence.products[:FIRST])):
+        asked = most_explaining(selector, products)
+        while asked and fits < SURROGATE_FITS:
+            more, fits = _fitted(fitter, named, model, asked, disturbance), fits + 1
+            wrong = {effect.label for effect in asked if not is_admissible(more.fit, [effect])}
+            if wrong:
+                fallen |= wrong
+                selector.usable[left_out()] = False
+                asked = [effect for effect in asked if effect.label not in wrong]
+                asked = asked or most_explaining(selector, products)
+            elif _worth(model, more):
+                return more
+            else:
+                asked = asked[: len(asked) // 2]
     return None
 
 
@@ -123,22 +130,22 @@ def _holding(model: Model, named: Model, names: Sequence[str]) -> Model:
     return model._replace(fit=fit, view=dataclasses.replace(model.view, vehicle=held(model.view.vehicle)))
 
 
-def largest_in_simulation(selector: Selector) -> list[AbstractEffect]:
-    """The candidates that explain most of the simulation error, by forward selection, with predicted parameters.
+def most_explaining(selector: Selector, products: Products) -> list[AbstractEffect]:
+    """The candidates that explain most under a disturbance, by forward selection, with predicted parameters.
 
     Sensor effects are left out: they do not describe the vehicle.
     """
     chosen: list[int] = []
     while len(chosen) < MOST_EFFECTS:
-        share = selector.of_free_run(chosen)
+        share = products.explained(selector.columns(chosen), selector.owners)
         taken = {selector.candidates[i].label for i in chosen}
         may = [int(i) for i in np.argsort(-share) if selector.usable[i] and selector.candidates[i].label not in taken]
         moves = (i for i in may if not isinstance(selector.candidates[i], AbstractInstrument))
-        best = next((i for i in moves if selector.freely_predicted(chosen, i)[1]), None)
+        best = next((i for i in moves if selector.predicted(chosen, i, products)[1]), None)
         if best is None or share[best] < PLACE_SHARE:
             break
         chosen.append(best)
-    beside = [selector.freely_predicted([j for j in chosen if j != i], i) for i in chosen]
+    beside = [selector.predicted([j for j in chosen if j != i], i, products) for i in chosen]
     return [effect for effect, admitted in beside if admitted]
 
 
