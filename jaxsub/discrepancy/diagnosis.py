@@ -201,7 +201,7 @@ class Explained:
 @dataclasses.dataclass(frozen=True)
 class Coefficient:
     """One free number before and after; `verdict` is `identified`, `weak` (standard error above half its size), or
-    `not excited` (the recordings leave it open)."""
+    `not excited` (the recordings leave it open), or `replaced` (by an effect that is another law of the same force)."""
 
     name: str
     unit: str

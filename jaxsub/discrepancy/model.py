@@ -30,13 +30,13 @@ def fit_with(
     Starts are the parameters by innovations (`view`), those of the `file`, and the vehicles `near`: a fit without the
     effects may be in an optimum that nothing leads out of, such as a rudder of the wrong sign. Where none of these is
     better than `fit`, starts are its own parameters with the effects at their predicted sizes or a tenth of them.
-    Searches that fall behind are given up. Parameters that are not free in `fit` keep its values.
+    Searches that fall behind are given up. Parameters are free that are so in `fit`, others keep its values.
     """
     listed = {effect.label for effect in file.effects}
     earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
-    values = fit.vehicle.values()
-    held = {row.name: values[row.name] for row in fit.vehicle.layout.parameters if not row.free}
-    raced = lambda starts: race([start.with_values(held).holding(held) for start in starts], fit.runs, fit.sigma)
+    values, free = fit.vehicle.values(), {row.name: row.free for row in fit.vehicle.layout.parameters}
+    held = {name: values[name] for name in free if not free[name]}
+    raced = lambda starts: race([start.with_values(held).with_freedom(free) for start in starts], fit.runs, fit.sigma)
     best = raced(
         [*near, with_scaled_effects(view.vehicle, effects, 1.0), with_scaled_effects(file, [*earlier, *effects], 1.0)]
     )

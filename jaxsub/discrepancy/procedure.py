@@ -28,7 +28,7 @@ from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress, limited
 from .settings import LISTED, REPORTED_DISTURBANCE, RIVALS_FITTED
-from .show import channel_quality, coefficients, estimates, run_quality, trades
+from .show import channel_quality, coefficients, estimates, replaced, run_quality, trades
 from .shown import shown_on
 from .structure_search import search_structure
 from .summary import summary
@@ -143,6 +143,7 @@ class _Account:
             runs=[*run_quality(train, "train"), *run_quality(test, "held out")],
             notes=[
                 *judged.notes,
+                *_replaced_notes(start, improved),
                 *disturbance_note(best.view),
                 *noise_note(field.signals),
                 *([] if shown is None else beyond_noise(shown.left, shown.after.rms, layout)),
@@ -222,6 +223,12 @@ def _physics(named: Named, improved: Solution) -> Physics:
         rivals,
         trades(improved, effect.label),
     )
+
+
+def _replaced_notes(start: Solution, improved: Solution) -> list[str]:
+    """A line for each of the baseline's coefficients that effects of the improved model replace."""
+    by = lambda name: ", ".join(effect.label for effect in improved.vehicle.effects if name in effect.replaces)
+    return [f"{name} is zero in the improved model: {by(name)} replaces it." for name in replaced(start, improved)]
 
 
 def disturbance_note(view: View) -> list[str]:

@@ -13,14 +13,24 @@ from .whiteness import record_sigma
 
 
 def coefficients(start: dict[str, float], baseline: Solution, improved: Solution) -> list[Coefficient]:
-    """Every free number before and after."""
+    """Every free number before and after, those that an effect replaced at the end."""
     rows = []
     for name in improved.names:
         before = _estimate(baseline, name)
         after = _estimate(improved, name)
         assert after is not None
         rows.append(Coefficient(name, after.unit, start.get(name, 0.0), before, after, _verdict(after)))
+    for name in replaced(baseline, improved):
+        before = _estimate(baseline, name)
+        assert before is not None
+        zero = ParameterEstimate(0.0, 0.0, before.unit)
+        rows.append(Coefficient(name, before.unit, start.get(name, 0.0), before, zero, "replaced"))
     return rows
+
+
+def replaced(baseline: Solution, improved: Solution) -> list[str]:
+    """The free numbers of the baseline that are not free in the improved model: effects are in their place."""
+    return [name for name in baseline.names if name not in improved.names]
 
 
 def _estimate(fit: Solution, name: str) -> ParameterEstimate | None:

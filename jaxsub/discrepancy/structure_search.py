@@ -11,6 +11,7 @@ from .evidence import evidence_of
 from .examine import examine, weighed
 from .name import standing
 from .progress import OutOfTime
+from .replacement import with_replacement
 from .settings import EXPLAINED, MAJORITY, MOST_EFFECTS, MOST_REJECTIONS
 from .stepwise import stepwise_by_innovations
 from .verdict import NOTHING, Judged, both, by_fit, helped, idle, incomplete, judge, settled
@@ -57,9 +58,9 @@ def answers(
     With effects to `begin` with, which an earlier answer had, the first round is theirs.
 
     After each acceptance all candidates are examined again from the new model: far from the truth, the linearisation
-    shows only the largest effect. Where the baseline cannot be simulated, and where all proposals are rejected,
-    stepwise selection by innovations is tried, once. Where the mismatch is significant still, the remaining candidates
-    are proposed.
+    shows only the largest effect. Coefficients of the baseline that it replaces are left out. Where the baseline cannot
+    be simulated, and where all proposals are rejected, stepwise selection by innovations is tried, once. Where the
+    mismatch is significant still, the remaining candidates are proposed.
     """
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
@@ -71,6 +72,7 @@ def answers(
     if begin:
         best, judged = warm_started(fitter, baseline, found, begin)
         if judged.named:
+            best, judged = with_replacement(fitter.progress, best, judged)
             yield best, judged
             found = examine(best.view, vocabulary, fitter.progress)
     while True:
@@ -86,6 +88,8 @@ def answers(
         if chosen and said.named:
             best, judged = without_redundant(fitter, baseline, best, judged, older)
             dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
+        if said.named:
+            best, judged = with_replacement(fitter.progress, best, judged)
         if chosen and not said.named:
             ahead = None if told_ahead else stepwise_by_innovations(fitter, best, vocabulary)
             if ahead is not None:

@@ -170,6 +170,12 @@ def idle(judged: Judged, label: str, others: Sequence[str], gain: Comparison) ->
     return dataclasses.replace(judged, verdict=_certainty(named), named=named, notes=[*judged.notes, note])
 
 
+def replacing(judged: Judged, names: Sequence[str], effects: Sequence[str], gain: Comparison) -> Judged:
+    """The judgement on coefficients of the baseline, by what is gained by them beside `effects` that replace them."""
+    label = f"{', '.join(names)} beside {', '.join(effects)}"
+    return dataclasses.replace(judged, decisions=[*judged.decisions, *_decisions(label, gain)])
+
+
 def settled(judged: Judged, stand: list[Named]) -> Judged:
     """The verdict once everything was tried: named by the accepted effects.
 

@@ -94,6 +94,11 @@ class AbstractEffect(eqx.Module):
         return ""
 
     @property
+    def replaces(self) -> tuple[str, ...]:
+        """Coefficients of a vehicle that are another law of the same force, and may be zero beside this one."""
+        return ()
+
+    @property
     def label(self) -> str:
         """A name that distinguishes two forms of one effect, such as `quadratic-damping[roll]`."""
         chosen = ",".join(value for value in options(self).values() if isinstance(value, str))

@@ -45,6 +45,11 @@ class CrossflowDrag(AbstractForce):
         return ("sway", "yaw") if self.plane == "horizontal" else ("heave", "pitch")
 
     @property
+    def replaces(self) -> tuple[str, ...]:
+        """Linear damping of the two equations by their own velocities."""
+        return tuple(f"{FORCES[equation]}_{VELOCITIES[equation]}" for equation in self.where)
+
+    @property
     def expression(self) -> str:
         """The integrals."""
         if self.plane == "horizontal":

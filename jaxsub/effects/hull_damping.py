@@ -28,6 +28,12 @@ class _PowerDamping(AbstractDerivative):
         """The equation's own velocity to the power, with its sign."""
         return Derivative(self.equation, (Power(self.equation, self.power),))
 
+    @property
+    def replaces(self) -> tuple[str, ...]:
+        """Linear damping of the same velocity."""
+        body = self.equation in VELOCITIES
+        return (f"{FORCES[self.equation]}_{VELOCITIES[self.equation]}" if body else f"D_{self.equation}",)
+
     def symbols(self) -> dict[str, str]:
         """SNAME symbol such as `K_pp`, `K_ppp`; `D2_roll`, `D3_roll` for a mechanism's coordinate."""
         if self.equation in VELOCITIES:

@@ -46,6 +46,11 @@ class CoulombFriction(AbstractCoordinateForce):
         return [cls(e, float(f"{facts.rate_scale[e] / 50.0:.3g}")) for e in facts.equations]
 
     @property
+    def replaces(self) -> tuple[str, ...]:
+        """Viscous friction."""
+        return (f"D_{self.equation}",)
+
+    @property
     def expression(self) -> str:
         """Friction and offset."""
         return f"-F_c sign({self.equation}') - F_0"
@@ -100,6 +105,11 @@ class CubicStiffness(AbstractCoordinateForce):
         return [cls(e) for e in facts.equations] if facts.kind == "mechanism" else []
 
     @property
+    def replaces(self) -> tuple[str, ...]:
+        """The linear spring."""
+        return (f"K_{self.equation}",)
+
+    @property
     def expression(self) -> str:
         """The restoring force."""
         return f"-k_3 {self.equation}³"
@@ -127,6 +137,11 @@ class Saturation(AbstractCoordinateForce):
         """Each coordinate of a mechanism, levelling off at a tenth of how far it went to all of it."""
         parts = (0.1, 0.2, 0.4, 0.7, 1.0)
         return [cls(e, x_s=number(part * far)) for e, far in facts.travel.items() for part in parts]
+
+    @property
+    def replaces(self) -> tuple[str, ...]:
+        """The linear spring."""
+        return (f"K_{self.equation}",)
 
     @property
     def expression(self) -> str:

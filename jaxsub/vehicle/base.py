@@ -189,8 +189,12 @@ class AbstractVehicle(eqx.Module):
 
     def holding(self, names: Collection[str]) -> Self:
         """The same vehicle, the numbers of those `names` no longer free."""
-        held = lambda row: dataclasses.replace(row, free=row.free and row.name not in names)
-        layout = dataclasses.replace(self.layout, parameters=tuple(map(held, self.layout.parameters)))
+        return self.with_freedom(dict.fromkeys(names, False))
+
+    def with_freedom(self, free: Mapping[str, bool]) -> Self:
+        """The same vehicle, the numbers that `free` names free or not; what it lacks of them is passed over."""
+        changed = lambda row: dataclasses.replace(row, free=free.get(row.name, row.free))
+        layout = dataclasses.replace(self.layout, parameters=tuple(map(changed, self.layout.parameters)))
         return dataclasses.replace(self, layout=layout)
 
     def position_rates(self, motion: Motion) -> dict[str, Signal]:

@@ -1,0 +1,45 @@
+"""Replacement: a coefficient of the baseline gives way to an effect that is another law of the same force.
+
+The coefficient of a linear drag and that of a quadratic one are correlated estimates. Where one of them is enough, the
+other only makes it less certain.
+"""
+
+import numpy as np
+from scipy import special
+
+from .acceptance import Model, fitted_model
+from .cross_validation import compare
+from .model import refit
+from .progress import Progress
+from .settings import SIGNIFICANCE
+from .verdict import Judged, replacing
+from .view import look
+
+
+def with_replacement(progress: Progress, model: Model, judged: Judged) -> tuple[Model, Judged]:
+    """The model without the coefficients that its effects may replace, if these are not accepted beside them."""
+    names = replaceable(model)
+    if not names:
+        return model, judged
+    progress(f"fitting without {', '.join(names)}")
+    zero = model.fit.vehicle.with_values({name: np.zeros(()) for name in names}).holding(names)
+    fit = refit(model.fit, zero)
+    fewer = fitted_model(fit, look(fit, model.view.disturbance), model.added)
+    gain = compare(fewer.predicted, model.predicted)
+    judged = replacing(judged, names, [effect.label for effect in model.added if effect.replaces], gain)
+    return (model if gain.accepted or not fewer.significant else fewer), judged
+
+
+def replaceable(model: Model) -> list[str]:
+    """The free coefficients that added effects may replace: zero is admissible, and Wald's test does not reject it."""
+    asked = {name for effect in model.added for name in effect.replaces}
+    if not asked:
+        return []
+    view, found = model.view, []
+    values = view.vehicle.values()
+    for place, row in enumerate(view.vehicle.layout.free):
+        if row.name in asked and row.lower <= 0.0 <= row.upper and not row.varies:
+            wald = float(values[row.name]) ** 2 / float(view.covariance[place, place])
+            if not special.chdtrc(1, wald) < SIGNIFICANCE:
+                found.append(row.name)
+    return found
