@@ -21,7 +21,6 @@ from jaxsub.discrepancy.acceptance import (
     ModelFitter,
     accept_jointly,
     accept_singly,
-    dominant,
 )
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
 from jaxsub.discrepancy.model import are_significant, fit_with
@@ -297,23 +296,6 @@ def test_what_is_beyond_doubt_stays_unknown_where_the_rest_says_nothing(monkeypa
     asked = Asked(monkeypatch, Judged("unknown", [], 1e-9, ["refused"]), nothing)
     answer, left = asked.answer()
     assert (answer.verdict, answer.p_value, left) == ("unknown", 1e-9, True)
-
-
-class Weighed(Selector):
-    """What `leading` asks of a selector: log evidence of sets of candidates, which are given."""
-
-    def __init__(self, values):
-        self.values = {(): 0.0} | values
-
-    def value(self, chosen):
-        return self.values[tuple(chosen)]
-
-
-def test_what_alone_says_nearly_all_is_tried_first_and_alone():
-    """Claim: at 92 % of the gain one leads whichever place it was chosen in, at 62 % they are tried together."""
-    assert dominant(Weighed({(0,): 58.0, (1,): 792.0, (0, 1): 862.0}), [0, 1]) == [1]
-    assert dominant(Weighed({(0,): 123.0, (1,): 20.0, (0, 1): 198.0}), [0, 1]) == []
-    assert dominant(Weighed({(3,): 40.0}), [3]) == [3]
 
 
 def fitted_to(monkeypatch, model, said, after, asked):
