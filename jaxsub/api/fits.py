@@ -18,7 +18,7 @@ from ..estimate import (
     Assessment,
     ChannelResidual,
     Passes,
-    RunVariation,
+    RunValues,
     Solution,
     assess,
     batch,
@@ -212,7 +212,7 @@ class Fit(AbstractResult):
         return estimates(self.solution, self.identifiability, self.coloured)
 
     @cached_property
-    def variations(self) -> tuple[RunVariation, ...]:
+    def variations(self) -> tuple[RunValues, ...]:
         """The numbers that differ by run: standard deviation between runs, and each run's own value."""
         return self.solution.variations
 
@@ -351,7 +351,7 @@ class Fit(AbstractResult):
             "by_run": {one.name: self._by_run(one) for one in self.variations},
         }
 
-    def _by_run(self, one: RunVariation) -> dict[str, Any]:
+    def _by_run(self, one: RunValues) -> dict[str, Any]:
         spread = {"value": one.spread, "standard_error": one.spread_error, "estimated": one.estimated}
         each = zip(self.runs, one.values, one.errors, strict=True)
         runs = [{"run": run, "value": float(value), "standard_error": float(error)} for run, value, error in each]

@@ -6,7 +6,8 @@ of its derivatives J by the free numbers over blocks b of the runs, a block is p
 - one step ahead, $\ln p(y_b | y_{-b}) = \ln Z(H) - \ln Z(H - H_b) - \ln|L_b|$ from whitened innovations, with
   $\ln Z = -\tfrac12(r^Tr - b^TA^{-1}b + \ln|A|)$ the integral over all free numbers and $L_b$ the innovations' factors;
 - the whole run, $-\tfrac12\|e_b - J_b\hat\delta_{-b}\|^2$ from simulation errors over σ, with $\hat\delta_{-b}$ the
-  least-squares change of the free numbers without the block. A run's initial state is fitted to all of the run.
+  least-squares change of the free numbers without the block. A run's initial state is fitted to all of the run, but a
+  run's deviation of a number that differs by run is predicted as the free numbers are.
 
 Where neither of two models is better the mean of their differences over n blocks is zero, and Student's t of it has
 n - 1 degrees of freedom, but for the differences' skewness γ: a force that acts now and then tells in few blocks, and
@@ -23,7 +24,7 @@ from scipy import special
 
 from ..arrays import quietly
 from ..estimate import Problem, Solution
-from .evidence import conditional
+from .products import conditional
 from .settings import BLOCKS, BLOCKS_ONE_STEP, CLEAR_LOG_BAYES, LEVEL, SIGNIFICANCE
 from .view import Parts, View
 
@@ -131,28 +132,55 @@ def simulated(fit: Solution, blocks: int = BLOCKS, *, known_start: bool = False)
     if not np.all(np.isfinite(products)):
         return nowhere
     problem, free = fit.problem, len(fit.names)
-    prior = np.diag(np.asarray(problem.prior_std, float) ** -2.0)
     start_std = np.zeros_like(problem.start_std) if known_start else np.asarray(problem.start_std)
-    own = slice(1 + free, None)
     scale = np.concatenate([np.ones(1 + free), start_std])
-    products = products * scale[:, None] * scale
+    # runs' deviations come before the other initial states
+    states, deviations = fit.vehicle.layout.states, fit.vehicle.layout.deviations
+    varying = [i for i, name in enumerate(states) if name in deviations]
+    others = [i for i in range(len(states)) if i not in varying]
+    order = [*range(1 + free), *(1 + free + i for i in (*varying, *others))]
+    products = (products * scale[:, None] * scale)[..., order, :][..., order]
+    known = 1 + free + len(varying)
+    own = slice(known, None)
     # each run's initial state is optimal, and follows the other numbers by Y
     whole = products.sum(axis=1)
     try:
-        Y = np.linalg.solve(whole[:, own, own] + np.eye(len(start_std)), whole[:, own, : 1 + free])
+        Y = np.linalg.solve(whole[:, own, own] + np.eye(len(others)), whole[:, own, :known])
     except np.linalg.LinAlgError:
         # products so large that adding one changes none of them are of a model that nearly diverges
         return nowhere
     Y[..., 0] = 0.0
-    follow = np.concatenate([np.broadcast_to(np.eye(1 + free), (len(Y), 1 + free, 1 + free)), -Y], axis=1)
-    reduced = np.einsum("rqa,rbqs,rsc->rbac", follow, products, follow).reshape(-1, 1 + free, 1 + free)
-    penalty = np.sum(np.swapaxes(Y, 1, 2) @ Y, axis=0)
+    follow = np.concatenate([np.broadcast_to(np.eye(known), (len(Y), known, known)), -Y], axis=1)
+    reduced = np.einsum("rqa,rbqs,rsc->rbac", follow, products, follow)
+    away = np.where(start_std > 0.0, np.asarray(fit.start - problem.guess), 0.0)
+    moved = away / np.where(start_std > 0.0, start_std, 1.0)
+    each = reduced.sum(axis=1) + np.swapaxes(Y, 1, 2) @ Y + _deviation_priors(moved[:, varying], known)
+    shared = [_without_last(run, len(varying)) for run in each]
+    total = np.sum(shared, axis=0)
+    total[1:, 1:] += np.diag(np.asarray(problem.prior_std, float) ** -2.0)
     values = _prior_pull(problem)
-    total = reduced.sum(axis=0) + penalty
-    total[1:, 1:] += prior
     total[0, 1:] += values
     total[1:, 0] += values
-    return np.array([-0.5 * _left(total - block, block) for block in reduced])
+    densities = []
+    for run, few, cut in zip(each, shared, reduced, strict=True):
+        rest = run + np.pad(total - few, (0, len(varying)))
+        densities += [-0.5 * _left(rest - block, block) for block in cut]
+    return np.array(densities)
+
+
+def _deviation_priors(moved: Float[np.ndarray, "r v"], known: int) -> Float[np.ndarray, "r q q"]:
+    """Products of the priors of runs' deviations, which `moved` by so many standard deviations, the last columns."""
+    v = moved.shape[1]
+    found = np.zeros((len(moved), known, known))
+    found[:, known - v :, known - v :] = np.eye(v)
+    found[:, 0, known - v :] = found[:, known - v :, 0] = -moved
+    return found
+
+
+def _without_last(gram: Float[np.ndarray, "q q"], count: int) -> Float[np.ndarray, "m m"]:
+    """Products of a residual and columns less what the last `count` columns take up."""
+    at = len(gram) - count
+    return gram[:at, :at] - gram[:at, at:] @ np.linalg.solve(gram[at:, at:], gram[at:, :at])
 
 
 def _prior_pull(problem: Problem) -> Float[np.ndarray, " p"]:

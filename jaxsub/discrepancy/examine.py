@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..effects import AbstractEffect, candidates, looked_at
+from ..effects import AbstractEffect, RunVariation, candidates, looked_at
 from ..likelihood import whitened
 from .acceptance import Examination
 from .columns import candidate_columns
@@ -25,11 +25,16 @@ def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, pro
 def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, *, present: bool = False) -> Selector:
     """All candidates that the vehicle of a view does not have; or also those that are `present` in it."""
     make_room()
-    there = set() if present else {effect.label for effect in view.vehicle.effects}
+    there = set() if present else {effect.label for effect in view.vehicle.all_effects}
     known = tuned(view, facts(view))
     effects = [effect for effect in candidates(known, vocabulary) if effect.label not in there]
-    columns, owners = candidate_columns(view, effects)
-    return Selector(Evidence.of(view, columns), effects, owners, looked_at(known, vocabulary))
+    varying = [effect for effect in effects if isinstance(effect, RunVariation)]
+    others = [effect for effect in effects if not isinstance(effect, RunVariation)]
+    columns, owners = candidate_columns(view, others)
+    free = [row.name for row in view.vehicle.layout.free]
+    evidence = Evidence.of(view, columns, varied=[free.index(effect.number) for effect in varying])
+    owners += [[len(columns) + k] for k in range(len(varying))]
+    return Selector(evidence, [*others, *varying], owners, looked_at(known, vocabulary))
 
 
 def weighed(view: View, selector: Selector, progress: Progress) -> Examination:
@@ -47,7 +52,8 @@ def weighed(view: View, selector: Selector, progress: Progress) -> Examination:
 
 def _memory(evidence: Evidence, naming: Naming) -> Memory:
     """The test of whether the innovations that the selected effects leave are white."""
-    products, system = naming.products, evidence.view.followed.system
+    products = naming.products
+    system = evidence.within(naming.columns, products).view.followed.system
     white, _ = whitened(products.disturbance, system, evidence.left(naming.columns, products))
     gain = 2.0 * (naming.value - evidence.best([])[0])
     return memory(np.asarray(white)[..., 0], np.asarray(system.measured), gain)

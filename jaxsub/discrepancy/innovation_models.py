@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..effects import AbstractEffect
+from ..effects import AbstractEffect, RunVariation
 from ..estimate import SearchEnd, evaluate, initial_guess, substeps_for
 from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import SUCCESSFUL
@@ -20,7 +20,7 @@ from ..vehicle import AbstractVehicle
 from .acceptance import Model, ModelFitter, fitted_model
 from .cross_validation import Comparison, compare, one_step_ahead, simulated
 from .evidence import evidence_of
-from .model import amplitude_indices, refit, with_scaled_effects
+from .model import amplitude_indices, refit, with_scaled_effects, without_variation
 from .programs import make_room
 from .restarts import restarted, starts
 from .selector import Selector
@@ -63,8 +63,8 @@ class InnovationModels:
         vehicle = best.view.vehicle.without_effect(label)
         for effect in rival:
             vehicle = vehicle.with_effect(effect)
-        before = {effect.label for effect in start.view.vehicle.effects}
-        more = [effect for effect in vehicle.effects if effect.label not in before]
+        before = {effect.label for effect in start.view.vehicle.all_effects}
+        more = [effect for effect in vehicle.all_effects if effect.label not in before]
         return self.with_effects(start, more, best.view.disturbance, [vehicle])
 
     def gain_by(self, best: Model, effect: AbstractEffect) -> Comparison:
@@ -91,6 +91,8 @@ def selector_without(selector: Selector, effect: AbstractEffect) -> Selector:
 def view_without(view: View, effect: AbstractEffect) -> tuple[View, np.ndarray]:
     """The view without one effect, on the same trajectory, and the (1 + p, 1 + m) sums of columns that lead to it."""
     rows, values = view.vehicle.layout.free, view.vehicle.values()
+    if isinstance(effect, RunVariation):
+        return without_variation(view, effect), np.eye(1 + len(rows))
     own = [i for i, row in enumerate(rows) if row.name.startswith(f"{effect.label}.")]
     others = [i for i in range(len(rows)) if i not in own]
     keep = np.eye(1 + len(rows))[:, [0, *(1 + i for i in others)]]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect, AbstractInstrument, Motion, by_name, velocities
+from ..effects import AbstractEffect, AbstractInstrument, Motion, RunVariation, by_name, numbers, velocities
 from ..likelihood import Disturbance
 from ..recording import Recording
 from .columns import columns_of, differences
@@ -98,6 +98,8 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
     """How the trace of accepted effects divides among the equations, actuators and sensors they act on."""
     pushed, shown = [], []
     equations, channels = view.vehicle.layout.equations, view.vehicle.layout.channels
+    varying = [effect for effect in effects if isinstance(effect, RunVariation)]
+    effects = [effect for effect in effects if not isinstance(effect, RunVariation)]
     for effect, whole in zip(effects, differences(view, effects), strict=True):
         if isinstance(effect, AbstractInstrument):
             shown += [(f"sensor:{c}", whole * (np.asarray(channels) == c)) for c in effect.channels]
@@ -106,9 +108,15 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
         else:
             pushed += [(e, whole * (np.arange(len(equations)) == i)) for i, e in enumerate(equations)]
     columns = columns_of(view, [c for _, c in pushed], [c for _, c in shown])
-    evidence = Evidence.of(view, columns, [disturbance])
+    free = [row.name for row in view.vehicle.layout.free]
+    varied = [free.index(effect.number) for effect in varying]
+    evidence = Evidence.of(view, columns, [disturbance], varied)
     left = evidence.products[0].unabsorbed() * evidence.length**2
     found: dict[str, float] = {}
+    for k, effect in enumerate(varying):
+        size = numbers(effect)["spread"] * view.length[varied[k]]
+        part = float(np.trace(evidence.products[0].left_by_run([], k))) * size**2
+        found |= {place: found.get(place, 0.0) + part / len(effect.where) for place in effect.where}
     for (place, _), part in zip([*pushed, *shown], np.maximum(left, 0.0), strict=True):
         found[place] = found.get(place, 0.0) + float(part)
     total = max(sum(found.values()), 1e-300)

@@ -7,10 +7,12 @@ import jax
 import numpy as np
 from scipy import special
 
-from ..effects import AbstractEffect, AbstractMemory, admissible, amplitudes, numbers, with_numbers
+from ..effects import AbstractEffect, AbstractMemory, RunVariation, admissible, amplitudes, numbers, with_numbers
 from ..estimate import AbstractSearchEnd, Solution, by_cost, evaluate, race, search
 from ..information import coloured_covariance
 from ..vehicle import AbstractVehicle
+from ..vehicle.layout import deviation
+from .products import integrated
 from .settings import NEGLIGIBLE, SIGNIFICANCE
 from .view import View
 
@@ -30,10 +32,11 @@ def fit_with(
     Starts are the parameters by innovations (`view`), those of the `file`, and the vehicles `near`: a fit without the
     effects may be in an optimum that nothing leads out of, such as a rudder of the wrong sign. Where none of these is
     better than `fit`, starts are its own parameters with the effects at their predicted sizes or a tenth of them.
-    Searches that fall behind are given up. Parameters are free that are so in `fit`, others keep its values.
+    Searches that fall behind are given up. Parameters are free that are so in `fit`, others keep its values. Standard
+    deviations between runs that the file does not have are estimated anew.
     """
-    listed = {effect.label for effect in file.effects}
-    earlier = [effect for effect in fit.vehicle.effects if effect.label not in listed]
+    listed = {effect.label for effect in file.all_effects}
+    earlier = [effect for effect in fit.vehicle.all_effects if effect.label not in listed]
     values, free = fit.vehicle.values(), {row.name: row.free for row in fit.vehicle.layout.parameters}
     held = {name: values[name] for name in free if not free[name]}
     raced = lambda starts: race([start.with_values(held).with_freedom(free) for start in starts], fit.runs, fit.sigma)
@@ -42,6 +45,9 @@ def fit_with(
     )
     if not float(best.cost) < float(fit.cost):
         best = by_cost([best, raced([with_scaled_effects(fit.vehicle, effects, share) for share in (1.0, 0.1)])])[0]
+    added = {name: np.nan for name in best.vehicle.spreads if name not in file.spreads}
+    if added:
+        best = search(best.vehicle.with_spreads(added), fit.runs, sigma=fit.sigma)
     return evaluate(best)
 
 
@@ -66,7 +72,7 @@ def is_admissible(fit: AbstractSearchEnd, effects: Sequence[AbstractEffect]) -> 
     """
     labels, shortest = {effect.label for effect in effects}, float(np.min(np.asarray(fit.runs.steps)))
     longest = float(np.max(np.asarray(fit.runs.times)))
-    for effect in (e for e in fit.vehicle.effects if e.label in labels):
+    for effect in (e for e in fit.vehicle.all_effects if e.label in labels):
         found, linear, units = numbers(effect), amplitudes(effect), effect.units()
         times = {n for n in found if isinstance(effect, AbstractMemory) and units[n] == "s"}
         least = {n: shortest if n in times else NEGLIGIBLE for n in found}
@@ -85,8 +91,13 @@ def p_value(view: View, effect: AbstractEffect) -> float:
     r"""The p-value of an `effect` of a view's vehicle by Wald's test.
 
     The statistic $a^T P^{-1} a$ of its amplitudes, or of the parameters of an effect that has none, is $\chi^2$ under
-    the null. It is 1 for an effect that changes nothing, such as a limit that nothing reaches.
+    the null. It is 1 for an effect that changes nothing, such as a limit that nothing reaches. A standard deviation
+    between runs is on its bound under the null: twice its gain in log restricted likelihood is
+    $\tfrac12\chi^2_0+\tfrac12\chi^2_1$ of many runs, and less of few (Crainiceanu and Ruppert 2004).
     """
+    if isinstance(effect, RunVariation):
+        gain = restricted_log_likelihood(view) - restricted_log_likelihood(without_variation(view, effect))
+        return 0.5 * float(special.chdtrc(1, max(2.0 * gain, 0.0)))
     names, values = [row.name for row in view.vehicle.layout.free], view.vehicle.values()
     at = amplitude_indices(view, effect)
     columns = [np.asarray(part)[..., 1:][..., at] for part in jax.tree.leaves(view.base)]
@@ -95,6 +106,22 @@ def p_value(view: View, effect: AbstractEffect) -> float:
     size = np.array([float(values[names[i]]) for i in at])
     wald = size @ np.linalg.solve(view.covariance[np.ix_(at, at)], size)
     return float(special.chdtrc(len(at), max(float(wald), 0.0)))
+
+
+def without_variation(view: View, effect: RunVariation) -> View:
+    """The view without the differences between runs of one number, on the same trajectory."""
+    states = view.vehicle.layout.states
+    there = np.array([state != deviation(effect.number) for state in states])
+    followed = view.followed
+    start_std = jax.device_put(np.where(there, np.asarray(followed.system.start_std), 0.0))
+    system = dataclasses.replace(followed.system, start_std=start_std)
+    return dataclasses.replace(view, followed=dataclasses.replace(followed, system=system))
+
+
+def restricted_log_likelihood(view: View) -> float:
+    """The log restricted likelihood of a view's disturbance, free parameters integrated out."""
+    parts = view.products(view.base, view.disturbance)
+    return integrated(parts.products.sum(axis=0) + view.prior) - float(parts.log_determinants.sum())
 
 
 def amplitude_indices(view: View, effect: AbstractEffect) -> list[int]:

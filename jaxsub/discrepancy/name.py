@@ -15,7 +15,7 @@ from scipy import special
 
 from ..effects import AbstractEffect, numbers
 from .diagnosis import Candidate
-from .evidence import Products
+from .products import Products
 from .progress import Progress
 from .selector import Scan, Selector
 from .settings import (
@@ -219,14 +219,14 @@ def table(selector: Selector, scan: Scan) -> list[Candidate]:
     """The first scan as lines for the report: the best form of every label, the strongest first."""
     lines: dict[str, Candidate] = {}
     for i in np.argsort(-scan.statistic):
-        effect, columns, statistic = scan.effects[i], len(selector.owners[i]), float(scan.statistic[i])
+        effect, degrees, statistic = scan.effects[i], int(selector.degrees[i]), float(scan.statistic[i])
         symbols = effect.symbols()
         predicted = {symbols[field]: value for field, value in numbers(effect).items()}
         p_value = selector.p_value(int(i), scan)
         kept = float(selector.kept[i]) if selector.usable[i] else 0.0
         said = _outcome(bool(selector.usable[i]), bool(scan.right[i]), p_value)
         units = {symbols[field]: unit for field, unit in effect.units().items()}
-        line = Candidate(effect.name, effect.label, statistic, columns, p_value, predicted, kept, said, units)
+        line = Candidate(effect.name, effect.label, statistic, degrees, p_value, predicted, kept, said, units)
         lines.setdefault(f"{effect.label} {sorted(symbols.values())}", line)
     return list(lines.values())
 

@@ -8,14 +8,14 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 
-import jax
 import numpy as np
 from scipy import special
 
 from ..effects import KNOTS, SmoothForce, with_numbers
 from ..likelihood import Disturbance, smoothed
-from .columns import EffectColumns, columns_of
-from .evidence import Evidence, Products, conditional
+from .columns import columns_of
+from .evidence import Evidence
+from .products import Products, conditional
 from .settings import FORCE_DISTURBANCE_SHARES, LENGTH_SCALES, MAJORITY, SIGNIFICANCE
 from .smoothness import FINE, Smooth, coarse, smoothest
 from .spline_basis import basis_forces, promising_forces, smooth_forces
@@ -96,7 +96,8 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     if not forces:
         return None
     left = chosen.left(columns, under[-1])
-    mean, _ = smoothed(under[-1].disturbance, view.followed.system, left)
+    system = chosen.within(columns, under[-1]).view.followed.system
+    mean, _ = smoothed(under[-1].disturbance, system, left)
     weighed = promising_forces(view, forces, np.asarray(mean))
     asked = [
         p.disturbance if share == 1.0 else dataclasses.replace(p.disturbance, force=share * p.disturbance.force)
@@ -104,10 +105,11 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
         for share in FORCE_DISTURBANCE_SHARES
     ]
     # one force after the other: products between forces are not needed
-    picked = chosen.columns.picked(columns)
+    picked = chosen.columns.picked([c for c in columns if c < len(chosen.columns)])
     beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))
-    made = (Evidence.of(view, beside(force), asked) for force in weighed)
-    every = [_Weighed(found.products, found.length, len(columns)) for found in made]
+    made = (Evidence.of(view, beside(force), asked, chosen.varied) for force in weighed)
+    varying = [c - len(chosen.columns) for c in columns if c >= len(chosen.columns)]
+    every = [_Weighed(found.products, found.length, len(picked), varying) for found in made]
     values = [each.values(each.held) for each in every]
     best = int(np.argmax([np.max(each) for each in values]))
     found, at = every[best], int(np.argmax(values[best]))
@@ -116,7 +118,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     # the prior standard deviation counts as one parameter, and every force is equally probable a priori
     alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
     heights, size, explained = found.heights(at)
-    predicts = found.predicts(view, beside(weighed[best]))
+    predicts = found.predicts(dataclasses.replace(chosen, columns=beside(weighed[best]), length=found.unit, shares=()))
     force = dataclasses.replace(weighed[best], spread=float(f"{size:.6g}"))
     force, near = found.nearest(at, force, heights)
     return Pattern(force, heights, near, p_value, predicts, alone, explained)
@@ -126,12 +128,13 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
 class _Weighed:
     """Products of the chosen columns, the first `count`, and of one force's hat functions, in units of their lengths.
 
-    **Fields**: `unit`: (count + FINE,) the lengths.
+    **Fields**: `unit`: (count + FINE,) the lengths. `varying`: the chosen numbers that differ by run.
     """
 
     products: Sequence[Products]
     unit: np.ndarray
     count: int
+    varying: Sequence[int]
 
     @property
     def length(self) -> np.ndarray:
@@ -141,7 +144,7 @@ class _Weighed:
     @property
     def held(self) -> list[int]:
         """The chosen columns."""
-        return list(range(self.count))
+        return [*range(self.count), *(self.count + FINE + k for k in self.varying)]
 
     @property
     def own(self) -> list[int]:
@@ -166,16 +169,20 @@ class _Weighed:
     def together(self, products: Products) -> tuple[Products, np.ndarray, Smooth]:
         """Products of the chosen columns and of those of the force's prior, the sums they are of, and the function."""
         smooth = smoothest(products, self.held, self.own, self.length)
-        sums = products.sums(self.held, self.own, smooth.weights)
-        return products.mixed(sums, products.known), sums, smooth
+        inside, fixed = products.within(self.held)
+        sums = inside.sums(fixed, self.own, smooth.weights)
+        return inside.mixed(sums, products.known), sums, smooth
 
-    def predicts(self, view: View, columns: EffectColumns) -> bool:
+    def predicts(self, evidence: Evidence) -> bool:
         """Whether the force improves the prediction of parts of the recordings, under the best disturbance of each.
 
-        The products are of these `columns`: those of all forces would take much memory.
+        The products are of the columns of `evidence`: those of all forces would take much memory.
         """
-        whole = view.base + jax.tree.map(lambda column: column / self.unit, columns.dense())
-        found = [self._predicted(products, view.products(whole, products.disturbance)) for products in self.products]
+        found = []
+        for products in self.products:
+            own = evidence.within(self.held, products)
+            whole = own.view.base + own.picked(range(len(own.columns)))
+            found.append(self._predicted(products, own.view.products(whole, products.disturbance)))
         with_it, without = zip(*found, strict=True)
         return max(with_it) > max(without)
 
@@ -185,14 +192,15 @@ class _Weighed:
         mixed = parts._replace(products=sums.T @ parts.products @ sums)
         few = products.known + self.count
         fewer = parts._replace(products=parts.products[:, :few, :few])
-        with_it = conditional(both.with_priors([*self.held, *self.own]), mixed)
-        return float(np.sum(with_it)), float(np.sum(conditional(products.with_priors(self.held), fewer)))
+        inside, fixed = products.within(self.held)
+        with_it = conditional(both.with_priors([*fixed, *self.own]), mixed)
+        return float(np.sum(with_it)), float(np.sum(conditional(inside.with_priors(fixed), fewer)))
 
     def heights(self, at: int) -> tuple[np.ndarray, float, float]:
         """The force at the knots, its prior standard deviation, and the share explained by the chosen columns."""
         both, _, smooth = self.together(self.products[at])
-        gains = both.gains(self.held, [self.own])
-        fall = both.fall(self.held)
+        gains = both.gains(range(self.count), [self.own])
+        fall = self.products[at].fall(self.held)
         explained = fall / max(fall + float(gains.statistic[0]), 1e-300)
         heights = smooth.weights @ gains.amplitudes[0] / self.length
         return heights, smooth.size, float(np.clip(explained, 0.0, 1.0))

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..effects import FORCE_UNITS, AbstractEffect
+from ..effects import FORCE_UNITS, AbstractEffect, numbers, with_numbers
 from ..errors import InputError
 from ..estimate import Solution, batch, fit
 from ..findings import Finding
@@ -122,6 +122,7 @@ class _Account:
         where = _where(judged, self.first, field, train)
         own = improved if named is best else with_coloured_errors(named.view, named.fit)
         physics = [_physics(one, own) for one in judged.named]
+        given = [name for name, spread in vehicle.spreads.items() if float(spread) > 0.0]
         found = None if shown is None else shown.explained
         diagnosis = Conclusions(
             verdict=judged.verdict,
@@ -146,6 +147,7 @@ class _Account:
                 *_replaced_notes(start, improved),
                 *disturbance_note(best.view),
                 *noise_note(field.signals),
+                *(one.sentence() for one in improved.varying([n for n in improved.vehicle.spreads if n not in given])),
                 *([] if shown is None else beyond_noise(shown.left, shown.after.rms, layout)),
             ],
             next_manoeuvre=next_manoeuvre(judged.verdict, physics),
@@ -211,7 +213,8 @@ def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVe
 
 def _physics(named: Named, improved: Solution) -> Physics:
     """An accepted effect with its numbers from the final fit."""
-    effect = next((e for e in improved.vehicle.effects if e.label == named.effect.label), named.effect)
+    own = next((e for e in improved.vehicle.all_effects if e.label == named.effect.label), named.effect)
+    effect = with_numbers(named.effect, numbers(own))
     rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals[:LISTED]]
     return Physics(
         effect.name,
@@ -219,7 +222,7 @@ def _physics(named: Named, improved: Solution) -> Physics:
         list(effect.where),
         effect.expression,
         named.probability,
-        estimates(improved, effect.label, effect.symbols()),
+        estimates(improved, effect),
         rivals,
         trades(improved, effect.label),
     )

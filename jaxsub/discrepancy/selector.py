@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy import special
 
-from ..effects import AbstractEffect, admissible, admitted, amplitudes, numbers, with_numbers
+from ..effects import AbstractEffect, RunVariation, admissible, admitted, amplitudes, numbers, with_numbers
 from ..likelihood import Disturbance
 from .columns import plausible
-from .evidence import FIRST, Evidence, Products
+from .evidence import FIRST, Evidence
 from .multiplicity import family_wise, independent_tests
+from .products import Products
 from .settings import (
     IDENTIFIABLE_SHARE,
     LARGE_ERROR,
@@ -105,6 +106,10 @@ class Selector:
         among = [looked_at.get(effect.name, 0) / labels[effect.name] for effect in self.candidates]
         self.forms = np.maximum(among, 1.0)
         self._admitted = _Admitted(self.candidates)
+        # a number that differs by run has a column for each, less the mean
+        runs = len(evidence.view.followed.system.measured)
+        self.varying = np.array([isinstance(effect, RunVariation) for effect in self.candidates], bool)
+        self.degrees = np.where(self.varying, runs - 1, [len(own) for own in self.owners])
         self._begin()
 
     def _begin(self) -> None:
@@ -112,12 +117,14 @@ class Selector:
         self.estimated: set[tuple[int, ...]] = set()
         self.freely: set[int] = set()
         self.kept = self.evidence.products[0].kept(self.owners)
-        present = {effect.label for effect in self.evidence.view.vehicle.effects}
+        present = {effect.label for effect in self.evidence.view.vehicle.all_effects}
         absent = np.array([effect.label not in present for effect in self.candidates], bool)
         self.usable = np.isfinite(self.kept) & (self.kept > IDENTIFIABLE_SHARE) & absent
-        asked = [own for own, use in zip(self.owners, self.usable, strict=True) if use]
+        asked = [self.owners[i] for i in np.flatnonzero(self.usable & ~self.varying)]
         squares, _ = self.evidence.products[0].remaining([], range(len(self.evidence.length)))
-        self.tests = independent_tests(squares, asked, 1.0 / self.evidence.products[0].samples)
+        # numbers that may differ by run have columns of their own, and count as one test each
+        varying = int(np.sum(self.usable & self.varying))
+        self.tests = independent_tests(squares, asked, 1.0 / self.evidence.products[0].samples) + varying
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Selector":
         """The same candidates for a view that `Evidence.seen_from` takes."""
@@ -156,7 +163,7 @@ class Selector:
                 # twice the gain in likelihood, the disturbances of both their own
                 best[i], sizes[i] = values[i], gains.amplitudes[i]
                 statistic[i] = max(0.0, gains.statistic[i] + 2.0 * (at - base))
-        sizes = [a / self.evidence.length[o] for a, o in zip(sizes, self.owners, strict=True)]
+        sizes = [a / self.evidence.lengths[o] for a, o in zip(sizes, self.owners, strict=True)]
         effects, taken = _WithAmplitudes(self.candidates, sizes), {self.candidates[i].label for i in chosen}
         fresh = np.array([effect.label not in taken for effect in self.candidates], bool)
         right = self.usable & self._admitted(sizes) & fresh
@@ -186,7 +193,7 @@ class Selector:
         """A candidate with the parameters predicted beside `chosen`, and whether physics admits them."""
         own = self.owners[index]
         size = under.gains(self.columns(chosen), [own]).amplitudes[0]
-        return predict(self.candidates[index], size / self.evidence.length[own])
+        return predict(self.candidates[index], size / self.evidence.lengths[own])
 
     def lose_free_run(self) -> None:
         """Select by simulation no more: its selection was rejected, and accumulated errors have other causes."""
@@ -245,7 +252,7 @@ class Selector:
 
     def p_value(self, index: int, scan: Scan) -> float:
         """Of a candidate's χ², family-wise: the probability of so small a smallest p-value of all under the null."""
-        own = self.forms[index] * special.chdtrc(len(self.owners[index]), scan.statistic[index])
+        own = self.forms[index] * special.chdtrc(self.degrees[index], scan.statistic[index])
         return family_wise(float(own), self.tests)
 
     def smallest_p_value(self, scan: Scan) -> float:

@@ -26,6 +26,9 @@ SIGNIFICANCE: Final[float] = 0.01
 IDENTIFIABLE_SHARE: Final[float] = 1e-4
 # score from which a sensor error must be smaller than what the sensor shows
 PLAUSIBILITY_SCORE: Final[float] = 10.0
+# fewest training runs of which a number may differ by run: the difference of two is one contrast, of which any effect
+# that acts unlike in them explains as much
+FEWEST_RUNS: Final[int] = 3
 # spectral peaks of the missing force that become candidate wave frequencies, in each equation
 TONES: Final[int] = 4
 # independent frequencies on each side of a peak whose median is its background

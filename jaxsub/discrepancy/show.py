@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..effects import AbstractEffect, RunVariation
 from ..estimate import Solution
 from ..information.directions import FRACTION
 from ..recording import Recording
@@ -40,9 +41,12 @@ def _estimate(fit: Solution, name: str) -> ParameterEstimate | None:
     return ParameterEstimate(fit.values[name], fit.standard_errors[name], unit)
 
 
-def estimates(fit: Solution, label: str, symbols: dict[str, str]) -> dict[str, ParameterEstimate]:
+def estimates(fit: Solution, effect: AbstractEffect) -> dict[str, ParameterEstimate]:
     """The fitted numbers of one effect by symbol."""
-    found = {symbol: _estimate(fit, f"{label}.{symbol}") for symbol in symbols.values()}
+    if isinstance(effect, RunVariation):
+        (own,) = (one for one in fit.varying([effect.number]) if one.name == effect.number)
+        return {"spread": ParameterEstimate(own.spread, own.spread_error or 0.0, own.unit)}
+    found = {symbol: _estimate(fit, f"{effect.label}.{symbol}") for symbol in effect.symbols().values()}
     return {symbol: estimate for symbol, estimate in found.items() if estimate is not None}
 
 

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import KNOTS
-from .evidence import Products
+from .products import Products
 from .settings import LENGTH_SCALES
 from .spline_basis import hat_functions
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect
+from ..effects import AbstractEffect, RunVariation
 from .acceptance import CandidateModels, Model, ModelFitter, proposed_effects, without_insignificant
 from .cross_validation import Comparison, compare
 from .examine import listed, weighed
@@ -128,8 +128,10 @@ class _Search:
         the linearisation does not restore the evidence of the effect itself.
         """
         whole = every.evidence.best([])[0]
-        for asked in (lambda: selector_without(every, one.effect), lambda: self.listed(self._without(best, one))):
-            selector = asked()
+        asked = (lambda: selector_without(every, one.effect), lambda: self.listed(self._without(best, one)))
+        # differences between runs are no sum of columns that a linearisation could take away
+        for ask in asked[isinstance(one.effect, RunVariation) :]:
+            selector = ask()
             scan = selector.scan([])
             own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
             number = max(own, key=lambda i, value=scan.value: value[i])

@@ -140,7 +140,7 @@ def without_redundant(
     for effect in older:
         others = [e.label for e in best.added if e.label != effect.label]
         fewer = fitter.with_effects(
-            baseline, [e for e in best.fit.vehicle.effects if e.label in others], best.view.disturbance
+            baseline, [e for e in best.fit.vehicle.all_effects if e.label in others], best.view.disturbance
         )
         comparison = compare(fewer.predicted, best.predicted)
         if not comparison.accepted and fewer.significant:

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from ..effects import AbstractEffect, SmoothForce
+from ..effects import AbstractEffect, RunVariation, SmoothForce
 from .consistency import sigmas
-from .diagnosis import Explained, Location, Physics, Verdict
+from .diagnosis import Explained, Location, Physics, Rival, Verdict
 from .settings import LARGE_ERROR, SIGNIFICANCE
 
 
@@ -53,19 +53,24 @@ def _verdict(
     verdict: Verdict, physics: Sequence[Physics], where: Sequence[Location], found: Explained | None, p_value: float
 ) -> str:
     places = " and ".join(place.where for place in where[:2]) or "no equation"
-    names = ", then ".join(one.effect for one in physics)
+    names = ", then ".join(map(_named, physics))
     if verdict == "none":
         return _nothing(found, p_value)
     if verdict == "named":
         return f"The model lacks {names}, which acts in {places}."
     if verdict == "ambiguous":
-        rivals = sorted({rival.effect for one in physics for rival in one.rivals})
+        rivals = sorted({_named(rival) for one in physics for rival in one.rivals})
         unlike = f", but these runs do not separate it from {', '.join(rivals)}"
         others = unlike if rivals else ", but not with certainty"
         return f"Something is missing in {places}: {names}{others}."
     if not where:
         return "The recordings are not explained, and no missing effect is significant in any equation."
     return f"Something is missing in {places}, and nothing in the vocabulary explains it."
+
+
+def _named(one: Physics | Rival) -> str:
+    """The effect; of a number that differs by run also which."""
+    return one.label if one.effect == RunVariation.name else one.effect
 
 
 def _nothing(found: Explained | None, p_value: float) -> str:

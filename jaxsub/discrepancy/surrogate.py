@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..effects import AbstractEffect, AbstractInstrument, parameter_table
+from ..effects import AbstractEffect, AbstractInstrument, RunVariation, parameter_table
 from ..likelihood import Disturbance
 from .acceptance import Examination, Model, ModelFitter
 from .cross_validation import compare
@@ -133,14 +133,14 @@ def _holding(model: Model, named: Model, names: Sequence[str]) -> Model:
 def most_explaining(selector: Selector, products: Products) -> list[AbstractEffect]:
     """The candidates that explain most under a disturbance, by forward selection, with predicted parameters.
 
-    Sensor effects are left out: they do not describe the vehicle.
+    Sensor effects are left out: they do not describe the vehicle. So is what differs by run, which predicts no other.
     """
     chosen: list[int] = []
     while len(chosen) < MOST_EFFECTS:
         share = products.explained(selector.columns(chosen), selector.owners)
         taken = {selector.candidates[i].label for i in chosen}
         may = [int(i) for i in np.argsort(-share) if selector.usable[i] and selector.candidates[i].label not in taken]
-        moves = (i for i in may if not isinstance(selector.candidates[i], AbstractInstrument))
+        moves = (i for i in may if not isinstance(selector.candidates[i], AbstractInstrument | RunVariation))
         best = next((i for i in moves if selector.predicted(chosen, i, products)[1]), None)
         if best is None or share[best] < PLACE_SHARE:
             break

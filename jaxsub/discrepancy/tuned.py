@@ -13,7 +13,8 @@ import numpy as np
 
 from ..effects import Facts
 from .columns import columns_of
-from .evidence import Evidence, Products
+from .evidence import Evidence
+from .products import Products
 from .settings import TONE_SCORE
 from .view import View
 

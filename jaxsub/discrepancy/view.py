@@ -25,9 +25,9 @@ from ..likelihood import (
 from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import Trajectory
-from ..vehicle import AbstractVehicle, quantities_of
+from ..vehicle import AbstractVehicle, numbers_that_may_vary, quantities_of
 from .innovation_search import InnovationSearch, Iterate, distinct, with_wide_priors
-from .settings import BLOCKS, LARGE_ERROR
+from .settings import BLOCKS, FEWEST_RUNS, LARGE_ERROR, PLACE_SHARE
 from .tones import tones
 from .whiteness import record_sigma
 
@@ -114,7 +114,7 @@ def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVe
     """
     problem, rms = with_wide_priors(fit.problem), fit.rms
     much = max(rms.values()) > LARGE_ERROR
-    search = InnovationSearch(problem, problem.guess if much else fit.start)
+    search = InnovationSearch(problem, problem.guess if much else _trusted(fit))
     guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.start_std), noise=_white(fit))
     vehicles = [fit.vehicle, *([near] if much and near is not None else [])]
     best = lambda pairs: by_cost(search.evaluate(*pair) for pair in pairs)[0]
@@ -141,6 +141,14 @@ def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: I
     problem = with_wide_priors(Problem.of(vehicle, runs, sigma))
     search = InnovationSearch(problem, problem.guess)
     return _view(search, search.maximised(by_cost(search.evaluate(vehicle, one) for one in disturbances)[0]))
+
+
+@quietly
+def _trusted(fit: Solution) -> Array:
+    """The initial states of a fit, but for runs' deviations: the filter is to show how well those are predicted."""
+    layout = fit.vehicle.layout
+    fitted = [name not in layout.deviations for name in layout.states]
+    return jax.device_put(np.where(fitted, np.asarray(fit.start), np.asarray(fit.problem.guess)))
 
 
 @quietly
@@ -237,6 +245,7 @@ def facts(view: View) -> Facts:
         fixed_gains=view.vehicle.fixed_gains,
         density=view.vehicle.density,
         speed=view.vehicle.speed,
+        varying=_varying(view) if len(runs.times) >= FEWEST_RUNS else (),
     )
 
 
@@ -246,6 +255,29 @@ def _depths(view: View) -> tuple[float, float]:
     dives = {"heave", "pitch", "theta", "z"}.intersection([*layout.equations, *(name for name, _ in layout.prescribed)])
     least = float(depth.min())
     return least, float(depth.max()) if dives else least
+
+
+def _varying(view: View) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
+    """The free numbers that may differ by run and do not yet, with their units and the places that they act on.
+
+    Those are the equations with more than `PLACE_SHARE` of the squared forces over their inertia, or the sensors where
+    there is no force.
+    """
+    layout, mass = view.vehicle.layout, np.asarray(view.vehicle.mass_matrix())
+    shown, forcing = (np.asarray(part)[..., 1:] for part in (view.base.shown, view.base.forcing))
+    n, may = len(mass), numbers_that_may_vary(view.vehicle)
+    found = []
+    for i, row in enumerate(layout.free):
+        if row.varies or row.name not in may:
+            continue
+        # over the inertia forces and moments have one unit
+        force = np.sum((forcing[..., :n, i] @ mass.T) ** 2, axis=(0, 1)) / np.diag(mass)
+        names, squares = layout.equations, force
+        if not np.any(force):
+            names, squares = tuple(f"sensor:{c}" for c in layout.channels), np.sum(shown[..., i] ** 2, axis=(0, 1))
+        places = tuple(e for e, part in zip(names, squares, strict=True) if part > PLACE_SHARE * np.sum(squares))
+        found.append((row.name, row.unit, places))
+    return tuple(found)
 
 
 def _commanded(path: Trajectory, live: np.ndarray, column: int) -> tuple[float, float, float]:

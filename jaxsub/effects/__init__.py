@@ -49,6 +49,7 @@ from .motion import (
 )
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
 from .registry import VOCABULARY, candidates, from_script, looked_at, vocabulary
+from .run_variation import RunVariation
 from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
 from .sensors import SensorBias, SensorDrift, SensorScale
@@ -106,6 +107,7 @@ __all__ = [
     "PropellerRace",
     "PropellerTorque",
     "QuadraticDamping",
+    "RunVariation",
     "Saturation",
     "SensorBias",
     "SensorDelay",

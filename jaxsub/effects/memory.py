@@ -17,7 +17,7 @@ from .base import AbstractForce, amplitude, shape, stacked
 from .motion import FORCES, Facts, Motion, Signal, unit_per
 
 # what of a motion changes along a run
-_MOVING = ("rates", "positions", "actuators", "environment", "water", "buoyancy", "time")
+_MOVING = ("rates", "positions", "actuators", "environment", "water", "buoyancy", "cruise", "time")
 
 
 class AbstractMemory(AbstractForce):

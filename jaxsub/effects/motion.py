@@ -138,6 +138,7 @@ class Facts(eqx.Module):
       offsets of sensors such as `psi.offset`.
       An actuator by a name of its own has those of its force; a control surface has one such as `N_uu_port_fin`.
     - `fixed_gains`: the vehicle's actuators whose force no free number of its own scales as a whole.
+    - `varying`: numbers that may differ by run, each with its SI unit and what feels it.
     - `tones`: frequencies (rad/s) at which what each equation misses stands out, inside `wave_band`; `frequencies`: how
       many they were chosen among.
 
@@ -165,6 +166,7 @@ class Facts(eqx.Module):
     fixed_gains: tuple[str, ...] = ()
     density: float = STANDARD_DENSITY
     speed: float = 0.0
+    varying: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
 
     @property
     def shown(self) -> dict[str, str]:

@@ -27,6 +27,7 @@ from .mechanisms import AsymmetricDamping, CoulombFriction, CubicStiffness, Satu
 from .memory import FluidMemory, Hysteresis
 from .motion import Facts
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
+from .run_variation import RunVariation
 from .script import executed
 from .sensor_mounting import SensorLeverArm, SensorMisalignment
 from .sensor_response import SensorDelay, SensorRectification, SensorSaturation
@@ -85,11 +86,11 @@ VOCABULARY: tuple[type[AbstractEffect], ...] = (
 
 
 def vocabulary() -> tuple[type[AbstractEffect], ...]:
-    """`VOCABULARY` and the effects that installed packages declare as entry points of the group `jaxsub.effects`.
+    """`VOCABULARY`, `RunVariation`, and what installed packages declare as entry points of the group `jaxsub.effects`.
 
     **Raises** `InputError` for an entry point that cannot be loaded, is no effect or bears a name that is taken.
     """
-    kinds = list(VOCABULARY)
+    kinds: list[type[AbstractEffect]] = [*VOCABULARY, RunVariation]
     for entry in metadata.entry_points(group=GROUP):
         where = f"entry point {entry.name} of {GROUP}"
         try:

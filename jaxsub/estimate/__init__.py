@@ -2,7 +2,7 @@
 
 from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_residuals
 from .batches import batch, side_by_side
-from .between_runs import RunVariation
+from .between_runs import RunValues
 from .combined import Chain, Global
 from .dead_reckoning import Outage, Track, kinematic_filter, model_filter, tracks_of
 from .disturbance import estimate_disturbance
@@ -37,7 +37,7 @@ __all__ = [
     "Passes",
     "Problem",
     "Rate",
-    "RunVariation",
+    "RunValues",
     "SearchEnd",
     "Solution",
     "Track",

@@ -33,7 +33,7 @@ _RIDGE = 1e-12
 
 
 @dataclasses.dataclass(frozen=True)
-class RunVariation:
+class RunValues:
     """A number that differs by run.
 
     **Fields**
@@ -112,7 +112,7 @@ def run_variations(
     start: Float[Array, "r s"],
     covariance: Float[Array, "p p"],
     estimated: Sequence[str],
-) -> tuple[RunVariation, ...]:
+) -> tuple[RunValues, ...]:
     """The numbers that differ by run at an optimum.
 
     `products` and `covariance` are those of its `Solution`, `start` its initial states, `estimated` the numbers whose
@@ -135,7 +135,7 @@ def run_variations(
         spread_error = float(size * error) if np.isfinite(error) else None
         own_values = float(values[row.name]) + np.asarray(start)[:, at]
         given = row.name not in estimated
-        found.append(RunVariation(row.name, row.unit, size, not given, spread_error, own_values, np.sqrt(variance)))
+        found.append(RunValues(row.name, row.unit, size, not given, spread_error, own_values, np.sqrt(variance)))
     return tuple(found)
 
 

@@ -21,7 +21,7 @@ from ..results import RESULTS
 from ..vehicle import AbstractVehicle
 from .batches import batch
 from .between_runs import (
-    RunVariation,
+    RunValues,
     estimate_spreads,
     require_runs,
     run_variations,
@@ -141,10 +141,13 @@ class Solution(AbstractSearchEnd):
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
 
     @property
-    def variations(self) -> tuple[RunVariation, ...]:
+    def variations(self) -> tuple[RunValues, ...]:
         """The numbers that differ by run: mean, standard deviation between runs, and each run's own value."""
-        products = self.model.products
-        return run_variations(self.problem, products, self.start, self.covariance, self.estimated_spreads)
+        return self.varying(self.estimated_spreads)
+
+    def varying(self, estimated: Sequence[str]) -> tuple[RunValues, ...]:
+        """The same, the standard deviations of the numbers `estimated` being estimates, which have errors."""
+        return run_variations(self.problem, self.model.products, self.start, self.covariance, estimated)
 
     @property
     @quietly

@@ -2,6 +2,7 @@
 
 from .averages import Averages, group_means
 from .blocks import BlockLinearised, output_errors
+from .by_run import run_products, with_constants
 from .disturbance import (
     Columns,
     Disturbance,
@@ -50,7 +51,9 @@ __all__ = [
     "propagate",
     "residual_outputs",
     "restricted",
+    "run_products",
     "smoothed",
     "total_products",
     "whitened",
+    "with_constants",
 ]

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float
 from scipy.special import softmax
 
 from ..discrepancy.columns import candidate_columns
-from ..discrepancy.evidence import Products
+from ..discrepancy.products import Products
 from ..discrepancy.view import View, facts
 from ..effects import AbstractEffect, amplitudes, candidates, parameter_table
 from ..estimate import side_by_side

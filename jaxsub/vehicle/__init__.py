@@ -3,7 +3,7 @@
 from .absorb import added_effects, with_coefficients
 from .assembly import VehicleParts, build
 from .base import AbstractVehicle, Layout
-from .checks import require_inertia
+from .checks import numbers_that_may_vary, require_inertia
 from .dimensions import check_units
 from .from_python import own_model
 from .gazebo import read_sdf, sdf_text
@@ -33,6 +33,7 @@ __all__ = [
     "build",
     "check_units",
     "initial_file",
+    "numbers_that_may_vary",
     "own_model",
     "published_file",
     "quantities_of",

@@ -45,11 +45,11 @@ def added_effects(
     improved: AbstractVehicle, vehicle: AbstractVehicle, kinds: Sequence[type[AbstractEffect]]
 ) -> list[AbstractEffect]:
     """What `improved` has more than `vehicle`, as effects of `kinds`: its own, and those whose coefficients it has."""
-    there, values, layout = {effect.label for effect in vehicle.effects}, improved.values(), improved.layout
+    there, values, layout = {effect.label for effect in vehicle.all_effects}, improved.values(), improved.layout
     facts = Facts(
         layout.kind, layout.equations, tuple(name for name, _ in layout.inputs), layout.channels, (), 0.0, 0.0, {}, 0.0
     )
-    found = [effect for effect in improved.effects if effect.label not in there]
+    found = [effect for effect in improved.all_effects if effect.label not in there]
     for name, term in derivatives(improved.own_values()).items():
         if term.name in vehicle.has or term.rate or (effect := named(term, facts, tuple(kinds))) is None:
             continue

@@ -19,6 +19,7 @@ from ..effects import (
     AbstractInstrument,
     AbstractMemory,
     Motion,
+    RunVariation,
     Signal,
     parameter_table,
     with_numbers,
@@ -147,8 +148,16 @@ class AbstractVehicle(eqx.Module):
             effects.append(with_numbers(effect, {f: values[r.name] for f, r in rows.items() if r.name in values}))
         return dataclasses.replace(vehicle, effects=tuple(effects))
 
+    @property
+    def all_effects(self) -> tuple[AbstractEffect, ...]:
+        """Its effects, and the numbers that differ by run as such."""
+        units = {row.name: row.unit for row in self.layout.parameters}
+        return (*self.effects, *(RunVariation(n, units[n], spread=spread) for n, spread in self.spreads.items()))
+
     def with_effect(self, effect: AbstractEffect) -> Self:
-        """The same vehicle with one effect more, its numbers free."""
+        """The same vehicle with one effect more, its numbers free; or with a number that differs by run."""
+        if isinstance(effect, RunVariation):
+            return self._with_variations({**self.spreads, effect.number: effect.spread})
         layout = dataclasses.replace(
             self.layout, parameters=(*self.layout.parameters, *parameter_table(effect).values())
         )
@@ -157,6 +166,9 @@ class AbstractVehicle(eqx.Module):
 
     def without_effect(self, label: str) -> Self:
         """The same vehicle less the effect of that label."""
+        varied = {e.number for e in self.all_effects if isinstance(e, RunVariation) and e.label != label}
+        if len(varied) < len(self.spreads):
+            return self._with_variations({name: spread for name, spread in self.spreads.items() if name in varied})
         gone = {row.name for e in self.effects if e.label == label for row in parameter_table(e).values()}
         kept = tuple(e for e in self.effects if e.label != label)
         lost = {*memory_states(tuple(e for e in self.effects if e.label == label)), *map(deviation, gone)}
@@ -167,6 +179,14 @@ class AbstractVehicle(eqx.Module):
         )
         spreads = {name: spread for name, spread in self.spreads.items() if name not in gone}
         return dataclasses.replace(self, effects=kept, layout=layout, spreads=spreads)
+
+    def _with_variations(self, spreads: Mapping[str, Array]) -> Self:
+        """The same vehicle, the numbers of `spreads` and no other differing by run."""
+        rows = tuple(dataclasses.replace(row, varies=row.name in spreads) for row in self.layout.parameters)
+        fixed = (name for name in self.layout.positions if name not in self.layout.deviations)
+        positions = (*fixed, *(deviation(row.name) for row in rows if row.varies))
+        layout = dataclasses.replace(self.layout, parameters=rows, positions=positions)
+        return dataclasses.replace(self, layout=layout, spreads=dict(spreads))
 
     def with_spreads(self, spreads: Mapping[str, ArrayLike]) -> Self:
         """The same vehicle with other standard deviations between runs: `spreads` by name, SI."""

@@ -175,14 +175,19 @@ def check_effects(vehicle: AbstractVehicle, where: str) -> None:
 
 def check_variation(vehicle: AbstractVehicle, where: str) -> None:
     """Refuse numbers that differ by run where the model has no run: in what commands and columns pass before it."""
-    inputs = tuple(name for name, _ in vehicle.layout.inputs)
     rows = {row.name: e for e in vehicle.effects for row in parameter_table(e).values()}
+    own = numbers_that_may_vary(vehicle)
     for name in vehicle.spreads:
-        effect = rows.get(name)
-        before = effect is not None and not isinstance(effect, AbstractForce)
-        if before or (name in vehicle.sensors.numbers and name.rpartition(".")[0] in inputs):
+        if name not in own and not isinstance(rows.get(name), AbstractForce):
             known = "numbers of the body, coefficients, actuators, forces of effects, scales and offsets of outputs"
             raise InputError(f"{where}: {name}.varies", "cannot differ by run", f"delete it; these can: {known}")
+
+
+def numbers_that_may_vary(vehicle: AbstractVehicle) -> frozenset[str]:
+    """The numbers of a vehicle, without its effects', that may differ by run: all but those of inputs' columns."""
+    inputs = tuple(name for name, _ in vehicle.layout.inputs)
+    sensors = (name for name in vehicle.sensors.numbers if name.rpartition(".")[0] not in inputs)
+    return frozenset((*vehicle.own_values(), *sensors))
 
 
 def _at_rest(vehicle: AbstractVehicle) -> Motion:

@@ -9,6 +9,7 @@ from ..effects import (
     EQUATIONS,
     STANDARD_DENSITY,
     AbstractEffect,
+    RunVariation,
     SmoothForce,
     derivative,
     parameter_table,
@@ -94,7 +95,9 @@ def vehicle_from(
     quantities = quantities_of(measured.outputs, kind == "submerged-body")
     entries = data.get("effects", [])
     # only for a file with effects, since the vocabulary opens the metadata of every installed package
-    kinds = {kind.name: kind for kind in (*vocabulary(), SmoothForce, *effects)} if entries else {}
+    known = (*vocabulary(), SmoothForce, *effects) if entries else ()
+    # a number that differs by run says so itself, and is no entry
+    kinds = {kind.name: kind for kind in known if kind is not RunVariation}
     built_in, effect_rows = _read_effects(entries, where, kinds, quantities, tied)
     coriolis, attitude = _read_model(top.table("model"))
     parts = VehicleParts(

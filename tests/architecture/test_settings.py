@@ -30,6 +30,7 @@ ALLOWED = {
         "columns.py": {"_NUDGE", "_SMALL", "_AT_ONCE"}, "spline_basis.py": {"_CHOOSING"},
         "consistency.py": {"_DRAWS", "_SEED"},
         "multiplicity.py": {"_DRAWS", "_SEED"}, "process_noise.py": {"_SEED"}, "regime.py": {"_SHIFTS"},
+        "run_effect.py": {"_LEAST", "_TRIED"},
         "smoothness.py": {"FINE", "_SIZES"}, "tones.py": {"_LINES"}, "validation.py": {"_DELAYS"},
     },
     "designs the next manoeuvre, after the verdict": {

@@ -9,8 +9,8 @@ import pytest
 
 from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter, proposed_effects
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
-from jaxsub.discrepancy.evidence import Products, conditional
 from jaxsub.discrepancy.name import Named
+from jaxsub.discrepancy.products import Products, conditional
 from jaxsub.discrepancy.selector import Scan, Selector
 from jaxsub.discrepancy.structure_search import without_redundant
 from jaxsub.discrepancy.verdict import Judged
@@ -113,7 +113,7 @@ def test_what_rules_a_free_run_need_not_be_what_was_chosen_sample_by_sample():
 def test_what_stood_in_for_a_later_effect_is_left_out(monkeypatch, kept):
     """Claim: an older effect without which the training runs are predicted as well goes, and its name with it."""
     old, new = CubicDamping("yaw", -0.5), QuadraticDamping("surge", -0.5)
-    fit = SimpleNamespace(vehicle=SimpleNamespace(effects=(old, new)))
+    fit = SimpleNamespace(vehicle=SimpleNamespace(all_effects=(old, new)))
     best, fewer = Model(fit, SimpleNamespace(disturbance=None), None, (old, new)), Model(fit, None, None, (new,))
     fitter, asked = object.__new__(ModelFitter), []
     fitted = lambda base, effects, disturbance: asked.append(effects) or fewer

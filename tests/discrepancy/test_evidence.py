@@ -12,10 +12,11 @@ from jax import Array
 from scipy import stats
 
 from jaxsub.discrepancy.columns import candidate_columns, plausible, sensor_changes
-from jaxsub.discrepancy.evidence import Evidence, Products, conditional, evidence_of
+from jaxsub.discrepancy.evidence import Evidence, evidence_of
 from jaxsub.discrepancy.locate import effect_shares
 from jaxsub.discrepancy.model import is_admissible
 from jaxsub.discrepancy.name import select
+from jaxsub.discrepancy.products import Products, conditional
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.view import Parts, facts, look
 from jaxsub.effects import AbstractInstrument, FluidMemory, amplitude, candidates
