@@ -29,7 +29,7 @@ def main() -> None:
     parser.add_argument("--dives", type=int, nargs="+", default=[10, 30, 100, 300])
     chosen = parser.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
-    results = {"samples": SAMPLES, "cores": cores(), "engine": sources()[:12], "missions": []}
+    results = {"samples": SAMPLES, "cores": cores(), "missions": []}
     for dives in [4] if chosen.quick else sorted(chosen.dives):
         results["missions"].append(_diagnosed(dives))
         print(json.dumps(results["missions"][-1]))
@@ -48,6 +48,7 @@ def _diagnosed(dives: int) -> dict:
         found = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     named = [one["effect"] for one in found["physics"]]
     return {
+        "engine": sources()[:12],
         "dives": dives,
         "seconds": seconds,
         "cpu_seconds": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
