@@ -8,7 +8,7 @@ import numpy as np
 from scipy import special
 
 from ..effects import AbstractEffect, AbstractMemory, RunVariation, admissible, amplitudes, numbers, with_numbers
-from ..estimate import AbstractSearchEnd, Solution, by_cost, evaluate, race, search
+from ..estimate import AbstractSearchEnd, Solution, by_cost, evaluate, race, search, with_estimated_spreads
 from ..information import coloured_covariance
 from ..vehicle import AbstractVehicle
 from ..vehicle.layout import deviation
@@ -45,10 +45,8 @@ def fit_with(
     )
     if not float(best.cost) < float(fit.cost):
         best = by_cost([best, raced([with_scaled_effects(fit.vehicle, effects, share) for share in (1.0, 0.1)])])[0]
-    added = {name: np.nan for name in best.vehicle.spreads if name not in file.spreads}
-    if added:
-        best = search(best.vehicle.with_spreads(added), fit.runs, sigma=fit.sigma)
-    return evaluate(best)
+    added = [name for name in best.vehicle.spreads if name not in file.spreads]
+    return evaluate(with_estimated_spreads(best, added) if added else best)
 
 
 def refit(fit: AbstractSearchEnd, start: AbstractVehicle) -> Solution:

@@ -7,7 +7,7 @@ from .combined import Chain, Global
 from .dead_reckoning import Outage, Track, kinematic_filter, model_filter, tracks_of
 from .disturbance import estimate_disturbance
 from .filtered import Filtered
-from .fitting import AbstractSearchEnd, SearchEnd, Solution, channel_noise, channel_rms, evaluate, fit, race, search
+from .fitting import AbstractSearchEnd, SearchEnd, Solution, channel_noise, channel_rms, evaluate, fit, search
 from .initial_states import initial_guess, rest, state_channels
 from .integration_steps import substeps_for, substeps_unseen
 from .method import AbstractMethod, Found, Iterative, Passes, by_cost
@@ -15,6 +15,7 @@ from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, ne
 from .path_disturbance import disturbance_along
 from .posterior_draws import posterior
 from .problem import Expansion, Problem, require_free
+from .restarted_searches import race, with_estimated_spreads
 from .search_ends import Ends, ends
 from .starts import Basin, Rate, basins, scattered, success
 
@@ -75,4 +76,5 @@ __all__ = [
     "substeps_unseen",
     "success",
     "tracks_of",
+    "with_estimated_spreads",
 ]

@@ -29,7 +29,6 @@ from .between_runs import (
     wide_spreads,
     with_spreads,
 )
-from .blockwise import Descent, raced
 from .curvature import decoupled
 from .method import AbstractMethod, Passes, unwatched
 from .methods import filtered_first, gauss_newton
@@ -207,7 +206,22 @@ def search(
         require_runs(vehicle, len(runs.times), vehicle.layout.name)
     vehicle = vehicle.with_spreads(wide_spreads(vehicle, varied)) if varied else vehicle
     problem = Problem.of(vehicle, runs, noise, start, moving=moving, known_start=known_start)
-    y, total = problem.coordinates(), 0
+    return concentrated(problem, problem.coordinates(), estimated, varied, method, passes)
+
+
+def concentrated(
+    problem: Problem,
+    y: Float[Array, " d"],
+    estimated: np.ndarray,
+    varied: tuple[str, ...],
+    method: AbstractMethod | None = None,
+    passes: Passes | None = None,
+) -> SearchEnd:
+    """The end of a search from `y`, with the noise of channels `estimated` (c,) and the deviations of numbers `varied`.
+
+    Both are found anew at each end, until they settle.
+    """
+    runs, total = problem.runs, 0
     for _ in range(_CONCENTRATIONS):
         found = (method or gauss_newton()).run(problem, jax.device_put(np.asarray(y)[None]), passes=passes).one(0)
         y, cost, result = found.y, found.cost, found.result
@@ -233,21 +247,9 @@ def search(
         if settled:
             break
     return SearchEnd(
-        fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=known_start,
+        fitted, runs, states, problem.sigma, cost, jax.device_put(total), result, known_start=problem.known_start,
         estimated_spreads=varied,
     )  # fmt: skip
-
-
-def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " c"]) -> SearchEnd:
-    """The best of searches from several `vehicles`, as `search` finds it; those that fall behind are given up.
-
-    `runs` are stacked recordings, and `sigma` (c,) is the noise of their channels, SI.
-    """
-    begun = [Problem.of(vehicle, runs, sigma) for vehicle in vehicles]
-    best = raced([Descent(gauss_newton(), problem, problem.coordinates()) for problem in begun])
-    found = best.found.one(0)
-    fitted, states = best.problem.split(found.y)
-    return SearchEnd(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
 
 
 @compiled

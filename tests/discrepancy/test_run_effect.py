@@ -161,6 +161,7 @@ def test_deviations_are_a_state_of_the_filter_or_columns_of_each_run_alike(follo
     assert selector.p_value(number, selector.scan([])) < 1e-6
 
 
+@pytest.mark.long
 def test_two_runs_are_too_few():
     """Claim: of two runs no number may differ, of three any that is free; a fixed one never."""
     runs, _ = recordings(3, 7, SPREAD)

@@ -1,0 +1,32 @@
+"""Searches that begin where others have ended, or from several vehicles at once."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..recording.runs import Runs
+from ..vehicle import AbstractVehicle
+from .blockwise import Descent, raced
+from .fitting import AbstractSearchEnd, SearchEnd, concentrated
+from .methods import gauss_newton
+from .problem import Problem
+
+
+def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " c"]) -> SearchEnd:
+    """The best of searches from several `vehicles`, as `search` finds it; those that fall behind are given up.
+
+    `runs` are stacked recordings, and `sigma` (c,) is the noise of their channels, SI.
+    """
+    begun = [Problem.of(vehicle, runs, sigma) for vehicle in vehicles]
+    best = raced([Descent(gauss_newton(), problem, problem.coordinates()) for problem in begun])
+    found = best.found.one(0)
+    fitted, states = best.problem.split(found.y)
+    return SearchEnd(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
+
+
+def with_estimated_spreads(ended: AbstractSearchEnd, names: Sequence[str]) -> SearchEnd:
+    """The search on from where it `ended`, the standard deviations between runs of the numbers `names` open."""
+    problem = Problem.of(ended.vehicle, ended.runs, ended.sigma)
+    y = problem.coordinates_of(ended.vehicle, ended.start)
+    return concentrated(problem, y, np.zeros(len(ended.sigma), bool), tuple(names))
