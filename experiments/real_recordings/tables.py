@@ -11,6 +11,10 @@ def tables(results: dict[str, Any]) -> dict[str, str]:
         "roll decay": _by_channel(results["kvlcc2_rolldecay"]),
         "emps": _by_channel({"": results["emps"]}),
         "silverbox": _silverbox(results["silverbox"]),
+        "zigzags": _by_channel({"": results["kvlcc2_freerunning"]}),
+        "zigzags, fit": _fit(results["kvlcc2_freerunning"]),
+        "slocum": _by_channel(_spelled(results["slocum_comet2016"])),
+        "seaglider": _by_channel(_spelled(results["seaglider_sg542"])),
     }
 
 
@@ -24,6 +28,19 @@ def _by_channel(cases: dict[str, dict[str, Any]]) -> str:
             errors = [f"{of[channel]:.3g}" for of in (before, after, by_hand)]
             rows.append([f"{name} {channel}".strip(), *errors, f"`{found['verdict']}`", _named(found)])
     return table(["test run, rms", "baseline", "improved", "by hand", "verdict", "named"], rows)
+
+
+def _spelled(cases: dict[str, Any]) -> dict[str, Any]:
+    """The cases with and without the recorded density of the water."""
+    said = {"density": "with density,", "no_density": "without density,"}
+    return {said[name]: found for name, found in cases.items()}
+
+
+def _fit(found: dict[str, Any]) -> str:
+    """How much of each channel's variation in the test runs simulation follows."""
+    rows = found["held_out_fit_percent"]
+    channels = list(rows["baseline"])
+    return table(["fit, %", *channels], [[model, *(f"{of[c]:.1f}" for c in channels)] for model, of in rows.items()])
 
 
 def _named(found: dict[str, Any]) -> str:
