@@ -186,8 +186,8 @@ def check_variation(vehicle: AbstractVehicle, where: str) -> None:
 def numbers_that_may_vary(vehicle: AbstractVehicle) -> frozenset[str]:
     """The numbers of a vehicle, without its effects', that may differ by run: all but those of inputs' columns."""
     inputs = tuple(name for name, _ in vehicle.layout.inputs)
-    sensors = (name for name in vehicle.sensors.numbers if name.rpartition(".")[0] not in inputs)
-    return frozenset((*vehicle.own_values(), *sensors))
+    before = {name for name in vehicle.sensors.numbers if name.rpartition(".")[0] in inputs}
+    return frozenset(vehicle.own_values()) - before
 
 
 def _at_rest(vehicle: AbstractVehicle) -> Motion:
