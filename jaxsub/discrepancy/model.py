@@ -96,12 +96,17 @@ def p_value(view: View, effect: AbstractEffect) -> float:
     if isinstance(effect, RunVariation):
         gain = restricted_log_likelihood(view) - restricted_log_likelihood(without_variation(view, effect))
         return 0.5 * float(special.chdtrc(1, max(2.0 * gain, 0.0)))
-    names, values = [row.name for row in view.vehicle.layout.free], view.vehicle.values()
     at = amplitude_indices(view, effect)
     columns = [np.asarray(part)[..., 1:][..., at] for part in jax.tree.leaves(view.base)]
     if all(np.max(np.abs(part)) < _NO_COLUMN for part in columns):
         return 1.0
-    size = np.array([float(values[names[i]]) for i in at])
+    return wald_p_value(view, at)
+
+
+def wald_p_value(view: View, at: Sequence[int]) -> float:
+    """Wald's p-value of the free parameters at some indices of a view, each zero under the null."""
+    rows, values = view.vehicle.layout.free, view.vehicle.values()
+    size = np.array([float(values[rows[i].name]) for i in at])
     wald = size @ np.linalg.solve(view.covariance[np.ix_(at, at)], size)
     return float(special.chdtrc(len(at), max(float(wald), 0.0)))
 

@@ -5,11 +5,10 @@ other only makes it less certain.
 """
 
 import numpy as np
-from scipy import special
 
 from .acceptance import Model, fitted_model
 from .cross_validation import compare
-from .model import refit
+from .model import refit, wald_p_value
 from .progress import Progress
 from .settings import SIGNIFICANCE
 from .verdict import Judged, replacing
@@ -35,11 +34,7 @@ def replaceable(model: Model) -> list[str]:
     asked = {name for effect in model.added for name in effect.replaces}
     if not asked:
         return []
-    view, found = model.view, []
-    values = view.vehicle.values()
-    for place, row in enumerate(view.vehicle.layout.free):
-        if row.name in asked and row.lower <= 0.0 <= row.upper and not row.varies:
-            wald = float(values[row.name]) ** 2 / float(view.covariance[place, place])
-            if not special.chdtrc(1, wald) < SIGNIFICANCE:
-                found.append(row.name)
-    return found
+    rows = model.view.vehicle.layout.free
+    may = lambda row: row.name in asked and row.lower <= 0.0 <= row.upper and not row.varies
+    idle = lambda place: not wald_p_value(model.view, [place]) < SIGNIFICANCE
+    return [row.name for place, row in enumerate(rows) if may(row) and idle(place)]

@@ -15,9 +15,10 @@ from ..effects import AbstractEffect, AbstractInstrument, RunVariation, paramete
 from ..likelihood import Disturbance
 from .acceptance import Examination, Model, ModelFitter
 from .cross_validation import compare
-from .evidence import FIRST, Products
+from .evidence import FIRST
 from .examine import listed, weighed
 from .model import is_admissible, with_coloured_errors
+from .products import Products
 from .progress import OutOfTime
 from .selector import Selector
 from .settings import (

@@ -10,9 +10,9 @@ from diagnosis_cases import recorded, wrong
 
 from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter
 from jaxsub.discrepancy.cross_validation import Comparison, Gain
-from jaxsub.discrepancy.evidence import Products
 from jaxsub.discrepancy.model import fit_with
 from jaxsub.discrepancy.nonparametric import Pattern
+from jaxsub.discrepancy.products import Products
 from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.surrogate import with_surrogate
 from jaxsub.discrepancy.verdict import Judged
