@@ -25,7 +25,8 @@ def number(value: ArrayLike) -> Array:
 
     Python numbers would become weakly typed arrays, and a model that holds one is compiled for again once it is fitted.
     """
-    return jnp.asarray(value, jnp.result_type(float)) if isinstance(value, float | int) else jnp.asarray(value)
+    # by NumPy, since JAX compiles a program to convert a Python number
+    return jnp.asarray(np.asarray(value, jnp.result_type(float)) if isinstance(value, float | int) else value)
 
 
 @dataclasses.dataclass(frozen=True)

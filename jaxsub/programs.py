@@ -19,7 +19,7 @@ from typing import Any, TypeVar, cast
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
+import numpy as np
 from jax import export
 from jax.core import Tracer
 
@@ -172,7 +172,7 @@ def _load_lapack() -> None:
 
     https://github.com/jax-ml/jax/issues/29610
     """
-    jax.jit(jax.lax.linalg.cholesky).lower(jnp.eye(1))
+    jax.jit(jax.lax.linalg.cholesky).lower(np.eye(1))
 
 
 def cores() -> int:

@@ -176,7 +176,7 @@ def assess(found: AbstractSearchEnd) -> Assessment:
     known = [output.sigma is not None for output in vehicle.layout.outputs]
     fitted = len(found.names) + (0 if found.known_start else found.start.size)
     return assess_residuals(
-        vehicle.layout.channels, np.asarray(error / found.sigma), np.asarray(runs.mask), fitted, known
+        vehicle.layout.channels, np.asarray(error) / np.asarray(found.sigma), np.asarray(runs.mask), fitted, known
     )
 
 

@@ -168,7 +168,7 @@ class Mixed:
             found = summed_products(vehicle, problem.runs, start, problem.sigma, problem.start_std)
             products = np.asarray(found)
         p, spread = len(problem.prior_mean), np.asarray(problem.start_std)
-        moved = np.asarray(start - problem.guess) / np.where(spread > 0.0, spread, 1.0)
+        moved = (np.asarray(start) - np.asarray(problem.guess)) / np.where(spread > 0.0, spread, 1.0)
         q = products.shape[-1]
         back = np.tile(np.eye(q), (len(moved), 1, 1))
         back[:, p:-1, -1] = np.where(spread > 0.0, moved, 0.0)
