@@ -17,13 +17,15 @@ from ..likelihood import open_loop_errors
 from ..recording import Recording
 from .decisions import Decision
 from .diagnosis import ChannelQuality, Explained
-from .settings import BLOCKS, LARGE_ERROR, LISTED
+from .settings import BLOCKS, LARGE_ERROR
 from .validation import stacked_columns
 from .verdict import Judged
 from .view import View
 
 # simulations with random forces, of every run
 _DRAWS, _SEED = 32, 0
+# channels that a sentence lists
+_LISTED = 4
 
 
 def noise(quality: Sequence[ChannelQuality]) -> Float[np.ndarray, " c"]:
@@ -116,5 +118,5 @@ def consistent(judged: Judged, found: Explained, low: Mapping[str, float], asses
 def sigmas(rms: Mapping[str, float]) -> str:
     """`1.4 σ in psi, 1.2 σ in r`, the largest first."""
     ranked = sorted(rms.items(), key=lambda item: -item[1])
-    more = f" and more than noise in {len(ranked) - LISTED} others" if len(ranked) > LISTED else ""
-    return ", ".join(f"{value:.3g} σ in {channel}" for channel, value in ranked[:LISTED]) + more
+    more = f" and more than noise in {len(ranked) - _LISTED} others" if len(ranked) > _LISTED else ""
+    return ", ".join(f"{value:.3g} σ in {channel}" for channel, value in ranked[:_LISTED]) + more

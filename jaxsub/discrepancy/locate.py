@@ -20,16 +20,15 @@ from .evidence import Evidence
 from .process_noise import NoiseSignal
 from .regime import INCIDENCE, regime, regime_variables
 from .selector import Scan
-from .settings import (
-    FORCE_SIGMAS,
-    GROWTH_RATIO,
-    GROWTH_SCORE,
-    GROWTH_VARIABLES,
-    INTERVAL_GAP,
-    PLACE_SHARE,
-    SUPPORTED_FORCE_SIGMAS,
-)
+from .settings import PLACE_SHARE
 from .view import View, missing_force
+
+# missing force over its standard deviation from which it is significant, also where process noise rises too
+_SIGMAS, _SUPPORTED_SIGMAS = 2.5, 1.5
+# gap between significant intervals that are listed as one, of the run
+_GAP = 0.02
+# most variables that are listed as those a force grows with, least share of the best one's score, and least score
+_VARIABLES, _SCORE_SHARE, _LEAST_SCORE = 3, 0.8, 4.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -163,10 +162,10 @@ def _regime(view: View, clear: Sequence[np.ndarray]) -> Regime | None:
 def _clear(trace: ForceTrace, equation: str, signals: Sequence[NoiseSignal]) -> np.ndarray:
     """The samples (K,) at which a force exceeds its band; of fewer sigmas where the filter agrees."""
     size = np.abs(trace.force[equation]) / np.maximum(trace.band[equation], 1e-300)
-    clear = size > FORCE_SIGMAS
+    clear = size > _SIGMAS
     for signal in signals:
         if signal.run == trace.run:
-            clear |= (size > SUPPORTED_FORCE_SIGMAS) & signal.rises(equation, trace.times)
+            clear |= (size > _SUPPORTED_SIGMAS) & signal.rises(equation, trace.times)
     return clear
 
 
@@ -175,7 +174,7 @@ def _intervals(trace: ForceTrace, clear: np.ndarray) -> list[tuple[str, float, f
     at = np.flatnonzero(clear)
     if not len(at):
         return []
-    gap = INTERVAL_GAP * (trace.times[-1] - trace.times[0])
+    gap = _GAP * (trace.times[-1] - trace.times[0])
     cuts = np.flatnonzero(np.diff(trace.times[at]) > gap) + 1
     parts = np.split(at, cuts)
     return [(trace.run, float(trace.times[part[0]]), float(trace.times[part[-1]])) for part in parts]
@@ -193,8 +192,8 @@ def grows_with(view: View, equation: str) -> list[str]:
     pushed = [np.stack([motion[name] for motion in (starts, ends)])[..., None] * own for name in names]
     evidence = Evidence.of(view, columns_of(view, pushed), [view.disturbance])
     gain = evidence.products[0].gains([], [[i] for i in range(len(names))]).statistic
-    ranked = np.argsort(-gain)[:GROWTH_VARIABLES]
-    return [names[i] for i in ranked if gain[i] > GROWTH_RATIO * gain[ranked[0]] and gain[i] > GROWTH_SCORE]
+    ranked = np.argsort(-gain)[:_VARIABLES]
+    return [names[i] for i in ranked if gain[i] > _SCORE_SHARE * gain[ranked[0]] and gain[i] > _LEAST_SCORE]
 
 
 def motion_variables(motion: Motion) -> dict[str, np.ndarray]:

@@ -27,7 +27,7 @@ from .model import with_coloured_errors
 from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress, limited
-from .settings import LISTED, REPORTED_DISTURBANCE, RIVALS_FITTED
+from .settings import RIVALS_FITTED
 from .show import channel_quality, coefficients, estimates, replaced, run_quality, trades
 from .shown import shown_on
 from .structure_search import search_structure
@@ -36,6 +36,11 @@ from .surrogate import with_surrogate
 from .validation import beyond_noise
 from .verdict import Judged
 from .view import View, look
+
+# rivals of an effect that are listed
+_LISTED = 4
+# rms of a filtered disturbance force over its estimated standard deviation above which it is reported
+_REPORTED_DISTURBANCE = 0.3
 
 # receives each answer before the last: the diagnosis, which is not `complete`, and the improved vehicle
 Keep = Callable[[Conclusions, AbstractVehicle], object]
@@ -215,7 +220,7 @@ def _physics(named: Named, improved: Solution) -> Physics:
     """An accepted effect with its numbers from the final fit."""
     own = next((e for e in improved.vehicle.all_effects if e.label == named.effect.label), named.effect)
     effect = with_numbers(named.effect, numbers(own))
-    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals[:LISTED]]
+    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals[:_LISTED]]
     return Physics(
         effect.name,
         effect.label,
@@ -243,7 +248,7 @@ def disturbance_note(view: View) -> list[str]:
     said = [
         f"{e} {sized(e, q)}, {float(t):.2g} s"
         for e, q, t, rms in zip(layout.equations, disturbance.force, disturbance.time, total, strict=True)
-        if rms > REPORTED_DISTURBANCE * float(q)
+        if rms > _REPORTED_DISTURBANCE * float(q)
     ]
     return (
         [f"Random disturbance forces remain (standard deviation, correlation time): {'; '.join(said)}."] if said else []

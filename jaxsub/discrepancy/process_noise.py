@@ -38,9 +38,18 @@ from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulation import simulate
 from ..vehicle import AbstractVehicle
-from .settings import LEVEL, NOISE_FLOOR, NOISE_RANGE, NOISE_WINDOW, PRIOR_WIDTH
+from .settings import LEVEL
 
 _SEED = 0
+# constant process noise, sensors' σ per root second: with less the filter's uncertainty is slow to follow, with more it
+# corrects so much at once that a small force drowns in the sensors' noise
+_FLOOR = 0.1
+# least and most of the process noise on top of it, in the same unit
+_RANGE = (1e-4, 10.0)
+# samples over which the process noise is averaged
+_WINDOW = 50
+# initial states, in units of their own
+_START_STD = 10.0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,13 +103,13 @@ def noise_signals(fit: Solution, recordings: Sequence[Recording], copies: int = 
     densities = noise_densities(vehicle, fit.runs, fit.start, fit.sigma, draws)
     clean, recorded = (np.asarray(density) for density in densities)
     lengths = np.asarray(fit.runs.live).sum(1) + 1
-    if not (np.isfinite(clean).all() and np.isfinite(recorded).all() and lengths.min() > NOISE_WINDOW // 2):
+    if not (np.isfinite(clean).all() and np.isfinite(recorded).all() and lengths.min() > _WINDOW // 2):
         return []
     ratios, threshold = calibrated(clean, recorded, lengths)
     std = np.sqrt(recorded + floor(vehicle, np.asarray(fit.sigma)) ** 2)
     signals = []
     for run, recording in enumerate(recordings):
-        k, window = int(lengths[run]), NOISE_WINDOW * float(np.median(np.diff(recording.times)))
+        k, window = int(lengths[run]), _WINDOW * float(np.median(np.diff(recording.times)))
         of = lambda values, run=run, k=k: dict(zip(vehicle.layout.equations, values[run, :k].T, strict=True))
         signals.append(NoiseSignal(recording.name, recording.times, window, of(std), of(ratios), threshold))
     return signals
@@ -130,7 +139,7 @@ def calibrated(
     """
     place = np.arange(recorded.shape[1])
     # until then the filter settles
-    live = (place < lengths[:, None]) & (place >= NOISE_WINDOW // 2)
+    live = (place < lengths[:, None]) & (place >= _WINDOW // 2)
     copies = _averaged(clean, live)
     together = copies.sum(axis=0)
     # a copy counts not among those that it is held against, as the recording does not
@@ -145,7 +154,7 @@ def calibrated(
 def _averaged(density: Float[np.ndarray, "m r k n"], live: Bool[np.ndarray, "r k"]) -> Float[np.ndarray, "m r k n"]:
     """The mean of what is live over a centred window, which is shorter at the ends of a run."""
     place = np.arange(density.shape[2])
-    first, last = np.maximum(place - NOISE_WINDOW // 2, 0), np.minimum(place + NOISE_WINDOW // 2, len(place))
+    first, last = np.maximum(place - _WINDOW // 2, 0), np.minimum(place + _WINDOW // 2, len(place))
 
     def window(values: np.ndarray) -> np.ndarray:
         sums = np.concatenate([np.zeros_like(values[:, :, :1]), np.cumsum(values, axis=2)], axis=2)
@@ -176,18 +185,18 @@ def noise_filter(vehicle: AbstractVehicle, substeps: int, sigma: Float[Array, " 
     """The extended Kalman filter of a vehicle whose numbers are all known, with fuzzy noise above a constant one."""
     known = vehicle.holding(vehicle.values())
     scale = jnp.asarray(state_scale(known, sigma))
-    constant = ConstantNoise(jnp.diag(NOISE_FLOOR * scale))
-    least, most = NOISE_RANGE
+    constant = ConstantNoise(jnp.diag(_FLOOR * scale))
+    least, most = _RANGE
     rule = Above(constant, FuzzyNoise(least * scale, most * scale))
     # the start that a fit found has missing physics in it: the filter takes its own from the first samples
-    begin = jnp.diag(PRIOR_WIDTH * scale)
+    begin = jnp.diag(_START_STD * scale)
     # updated by covariances, whose program compiles in three quarters of the time
     return ExtendedKalmanFilter(VehicleProcess.of(known, substeps), rule, jnp.diag(sigma), begin, Covariance())
 
 
 def floor(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values, " n"]:
     """Root of the constant density beneath the rule's, of each equation."""
-    return NOISE_FLOOR * state_scale(vehicle, sigma)[: len(vehicle.layout.equations)]
+    return _FLOOR * state_scale(vehicle, sigma)[: len(vehicle.layout.equations)]
 
 
 @compiled

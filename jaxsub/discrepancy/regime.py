@@ -7,10 +7,14 @@ from jaxtyping import Bool, Float
 
 from ..effects import Motion, by_name
 from .diagnosis import Regime
-from .settings import LEVEL, REGIME_AREA, REGIME_SHARE
+from .settings import LEVEL
 from .spline_basis import STILL
 
 _SHIFTS = 199  # of the test by chance
+# area under the curve from which a variable marks a regime
+_AREA = 0.75
+# share of the samples that must lie inside and outside a regime's intervals
+_SHARE = 0.01
 INCIDENCE = ("attack", "sideslip")  # angles of the flow, rad
 
 Variables = Mapping[str, Float[np.ndarray, "r k"]]
@@ -36,7 +40,7 @@ def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.
     threshold is Youden's (1950).
     """
     share = inside[live].mean() if live.any() else 0.0
-    if not variables or not REGIME_SHARE < share < 1.0 - REGIME_SHARE:
+    if not variables or not _SHARE < share < 1.0 - _SHARE:
         return None
     names = [*variables]
     from scipy import stats
@@ -45,7 +49,7 @@ def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.
     areas = _areas(ranks, inside[live])
     best = int(np.argmax(np.abs(areas - 0.5)))
     reached = abs(areas[best] - 0.5)
-    if reached < REGIME_AREA - 0.5:
+    if reached < _AREA - 0.5:
         return None
     rng = np.random.default_rng(0)
     exceeded = [np.max(np.abs(_areas(ranks, _moved(inside, live, rng)[live]) - 0.5)) >= reached for _ in range(_SHIFTS)]

@@ -1,7 +1,8 @@
-"""Every constant that a decision of a diagnosis depends on, in the order of its steps.
+"""Every constant that can change a verdict or the improved model, in the order of a diagnosis.
 
-Shares are of one, levels are of p-values, and scores are $\\chi^2$. What only bounds rounding errors or the time that a
-search takes stands where it is used.
+Shares are of one, levels are of p-values, and scores are $\\chi^2$. What changes no verdict, no accepted effect and no
+number of the improved model stands where it is used: bounds of rounding errors, how a search converges, and how a
+report locates a mismatch and lists results.
 """
 
 from typing import Final
@@ -10,7 +11,7 @@ from typing import Final
 
 # rms of a residual over σ above which it is far above the noise
 LARGE_ERROR: Final[float] = 2.0
-# prior standard deviation of a coefficient, or of a filter's initial state, that has none, in units of its size
+# prior standard deviation of a coefficient that has none, in units of its size
 PRIOR_WIDTH: Final[float] = 10.0
 # disturbances under which evidence is computed, of the one estimated without candidates, which holds what is missing
 DISTURBANCE_SHARES: Final[tuple[float, ...]] = (1.0, 0.1, 0.003)
@@ -100,6 +101,8 @@ SURROGATE_FITS: Final[int] = 5
 SURROGATE_ROUNDS: Final[int] = 3
 # share of the squared simulation error that surrogate terms must remove
 SURROGATE_GAIN: Final[float] = 0.01
+# share of the squares that a surrogate term must explain, and that an equation in which a number acts must hold
+PLACE_SHARE: Final[float] = 0.05
 # growth of a named effect's standard error beside surrogate terms from which it keeps its value
 SURROGATE_INFLATION: Final[float] = 2.0
 # prior standard deviations of a nonparametric force that are tried, of the one with the highest evidence
@@ -117,42 +120,3 @@ EXPLAINED: Final[float] = 0.75
 RESIDUAL_LEVEL: Final[float] = 1e-3
 # level at which a mismatch is unknown, and not none, where every effect was rejected
 UNEXPLAINED_LEVEL: Final[float] = 1e-6
-
-# Location
-
-# share of the mismatch that a place, or one surrogate term, must hold
-PLACE_SHARE: Final[float] = 0.05
-# missing force over its standard deviation from which it is significant
-FORCE_SIGMAS: Final[float] = 2.5
-# the same where the filter's process noise rises too
-SUPPORTED_FORCE_SIGMAS: Final[float] = 1.5
-# gap between significant intervals that are one, of the run
-INTERVAL_GAP: Final[float] = 0.02
-# most variables that are listed as those a force grows with
-GROWTH_VARIABLES: Final[int] = 3
-# score of such a variable, of the best one's
-GROWTH_RATIO: Final[float] = 0.8
-# least score of such a variable
-GROWTH_SCORE: Final[float] = 4.0
-# area under the curve (Mann and Whitney) from which a variable marks a regime
-REGIME_AREA: Final[float] = 0.75
-# share of the samples that must lie inside and outside a regime's intervals
-REGIME_SHARE: Final[float] = 0.01
-# constant process noise of the location filter, sensors' σ per root second: with less its uncertainty is slow to
-# follow, with more it corrects so much at once that a small force drowns in the sensors' noise
-NOISE_FLOOR: Final[float] = 0.1
-# least and most of the process noise on top of it, in the same unit
-NOISE_RANGE: Final[tuple[float, float]] = (1e-4, 10.0)
-# samples over which the process noise is averaged
-NOISE_WINDOW: Final[int] = 50
-
-# Report
-
-# standard error over a coefficient's size from which it is not excited
-UNEXCITED_ERROR: Final[float] = 5.0
-# correlation of two estimates from which it is reported
-CORRELATED: Final[float] = 0.9
-# rms of a filtered disturbance force over its estimated standard deviation above which it is reported
-REPORTED_DISTURBANCE: Final[float] = 0.3
-# rivals or channels that a sentence or table lists
-LISTED: Final[int] = 4

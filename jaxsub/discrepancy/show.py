@@ -9,8 +9,12 @@ from ..estimate import Solution
 from ..information.directions import FRACTION
 from ..recording import Recording
 from .diagnosis import ChannelQuality, Coefficient, ParameterEstimate, RunQuality
-from .settings import CORRELATED, UNEXCITED_ERROR
 from .whiteness import record_sigma
+
+# correlation of two estimates from which it is reported
+_CLOSE = 0.9
+# standard error over a coefficient's size from which it is not excited
+_NOT_EXCITED = 5.0
 
 
 def coefficients(start: dict[str, float], baseline: Solution, improved: Solution) -> list[Coefficient]:
@@ -62,13 +66,13 @@ def trades(fit: Solution, label: str) -> dict[str, float]:
     if not between.size:
         return {}
     worst = between[np.argmax(np.abs(between), axis=0), np.arange(len(own))]
-    found = {n: float(r) for n, r, mine in zip(fit.names, worst, own, strict=True) if not mine and abs(r) >= CORRELATED}
+    found = {n: float(r) for n, r, mine in zip(fit.names, worst, own, strict=True) if not mine and abs(r) >= _CLOSE}
     return dict(sorted(found.items(), key=lambda item: -abs(item[1])))
 
 
 def _verdict(estimate: ParameterEstimate) -> str:
     ratio = estimate.standard_error / max(abs(estimate.value), 1e-300)
-    return "identified" if ratio < FRACTION else "weak" if ratio < UNEXCITED_ERROR else "not excited"
+    return "identified" if ratio < FRACTION else "weak" if ratio < _NOT_EXCITED else "not excited"
 
 
 def channel_quality(fit: Solution) -> list[ChannelQuality]:

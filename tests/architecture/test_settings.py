@@ -1,4 +1,4 @@
-"""Every number that a diagnosis decides by stands in `discrepancy/settings.py`, named, and is used."""
+"""Every number that a diagnosis decides by, and no other, stands in `discrepancy/settings.py`, named, and is used."""
 
 import ast
 from pathlib import Path
@@ -28,10 +28,18 @@ ALLOWED = {
     },
     "is the resolution of a grid, a difference or a random test": {
         "columns.py": {"_NUDGE", "_SMALL", "_AT_ONCE"}, "spline_basis.py": {"_CHOOSING"},
-        "consistency.py": {"_DRAWS", "_SEED"},
-        "multiplicity.py": {"_DRAWS", "_SEED"}, "process_noise.py": {"_SEED"}, "regime.py": {"_SHIFTS"},
+        "consistency.py": {"_DRAWS", "_SEED"}, "multiplicity.py": {"_DRAWS", "_SEED"},
         "run_effect.py": {"_LEAST", "_TRIED"},
         "smoothness.py": {"FINE", "_SIZES"}, "tones.py": {"_LINES"}, "validation.py": {"_DELAYS"},
+    },
+    "says where and when a mismatch is, after the verdict": {
+        "locate.py": {"_SIGMAS", "_SUPPORTED_SIGMAS", "_GAP", "_VARIABLES", "_SCORE_SHARE", "_LEAST_SCORE"},
+        "process_noise.py": {"_SEED", "_FLOOR", "_RANGE", "_WINDOW", "_START_STD"},
+        "regime.py": {"_SHIFTS", "_AREA", "_SHARE"},
+    },
+    "is what a report lists": {
+        "consistency.py": {"_LISTED"}, "procedure.py": {"_LISTED", "_REPORTED_DISTURBANCE"},
+        "show.py": {"_CLOSE", "_NOT_EXCITED"},
     },
     "designs the next manoeuvre, after the verdict": {
         "manoeuvre.py": {"_WIDER", "_LEAST", "_PARTS"}, "next_run.py": {"_LONGEST"},
@@ -41,6 +49,8 @@ ALLOWED = {
     "is a limit of the process": {"evidence.py": {"_SAMPLES", "_MEMORY"}, "programs.py": {"_MANY"}},
     "is what is said where nothing was tested": {"verdict.py": {"NOTHING"}, "whiteness.py": {"RANDOM"}},
 }  # fmt: skip
+# modules whose numbers come after the verdict: none that decides may import them
+AFTER = {"locate", "process_noise", "regime", "show", "manoeuvre", "next_run", "separation"}
 # numbers other than 0 and 1 that something is compared with as they stand, by why
 COMPARED = {
     "regime.py": {0.5},  # the area under the curve of what is chance
@@ -85,6 +95,14 @@ def test_no_module_but_the_settings_has_a_number_to_decide_by(path):
     allowed = set().union(*(by_file.get(path.name, set()) for by_file in ALLOWED.values()))
     assert named_numbers(tree) == allowed, "numbers to decide by belong in settings.py"
     assert compared_numbers(tree) == COMPARED.get(path.name, set()), "name it in settings.py"
+
+
+def test_no_decision_reads_a_module_whose_numbers_come_after_the_verdict():
+    """Claim: the modules that say where a mismatch is, or what next, are imported by the whole path and each other."""
+    for path in FILES:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        imported = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+        assert not imported & AFTER or path.stem in {"procedure", *AFTER}, f"{path.name} decides by what is reported"
 
 
 def test_the_search_for_numbers_finds_every_form():
