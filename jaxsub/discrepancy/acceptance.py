@@ -10,6 +10,7 @@ from ..effects import AbstractEffect, AbstractMemory
 from ..estimate import AbstractSearchEnd, Solution, substeps_for, substeps_unseen
 from ..likelihood import Disturbance
 from ..vehicle import AbstractVehicle
+from . import settings
 from .cross_validation import Comparison, Predicted, compare, one_step_ahead, simulated
 from .evidence import evidence_of
 from .model import are_significant, fit_with, is_admissible, p_value, refit, with_scaled_effects
@@ -19,7 +20,6 @@ from .programs import make_room
 from .progress import Progress
 from .rivals import robust_log_evidence
 from .selector import Selector
-from .settings import DOMINANT_SHARE, FORCE_RATIO, SIGNIFICANCE
 from .verdict import Judged, helped, settled
 from .view import View, look
 from .whiteness import Memory
@@ -172,7 +172,7 @@ class CandidateModels:
         own = dict(zip(key, model.added[len(model.added) - len(key) :], strict=True))
         test = lambda effect: p_value(model.view, effect) if is_admissible(model.fit, [effect]) else 1.0
         p_values = {i: test(effect) for i, effect in own.items()}
-        return [i for i in sorted(p_values, key=lambda i: -p_values[i]) if not p_values[i] < SIGNIFICANCE]
+        return [i for i in sorted(p_values, key=lambda i: -p_values[i]) if not p_values[i] < settings.SIGNIFICANCE]
 
     def accepts(self, fewer: Sequence[int], more: int) -> bool:
         """Whether one candidate more on top of `fewer` is accepted; the comparison is kept in `said`."""
@@ -260,7 +260,7 @@ def dominant(selector: Selector, chosen: Sequence[int]) -> list[int]:
     before = selector.value([])
     gains = {index: selector.value([index]) - before for index in chosen}
     best = max(gains, key=lambda index: gains[index])
-    return [best] if gains[best] > DOMINANT_SHARE * (selector.value(chosen) - before) else []
+    return [best] if gains[best] > settings.DOMINANT_SHARE * (selector.value(chosen) - before) else []
 
 
 def accept_proposed(
@@ -310,7 +310,7 @@ def proposed_effects(found: Examination, judged: Judged) -> list[int]:
     if not np.any(share):
         return []
     nameless = 1.0 - most_explained(found.view, selector.free.disturbance)
-    for among, less in ((numbers, FORCE_RATIO), (range(len(share)), 1.0)):
+    for among, less in ((numbers, settings.FORCE_RATIO), (range(len(share)), 1.0)):
         best = max(among, key=lambda i: share[i], default=None)
         if best is not None and share[best] > 0.0 and 1.0 - share[best] <= less * nameless:
             selector.freely.add(best)

@@ -15,9 +15,9 @@ from jaxtyping import Float
 from ..estimate.assessment import Assessment, assess_residuals
 from ..likelihood import open_loop_errors
 from ..recording import Recording
+from . import settings
 from .decisions import Decision
 from .diagnosis import ChannelQuality, Explained
-from .settings import BLOCKS, LARGE_ERROR
 from .validation import stacked_columns
 from .verdict import Judged
 from .view import View
@@ -81,7 +81,7 @@ def expected_errors(view: View, scale: Float[np.ndarray, " c"]) -> dict[str, flo
     missing physics is.
     """
     system, disturbance = view.followed.system, view.disturbance
-    block = float(np.max(np.sum(np.asarray(system.intervals), axis=1))) / BLOCKS
+    block = float(np.max(np.sum(np.asarray(system.intervals), axis=1))) / settings.BLOCKS
     random = np.where(np.asarray(disturbance.time) < block, disturbance.force, 0.0)
     measured = np.asarray(system.measured)
     draws = np.random.default_rng(_SEED).standard_normal((*measured.shape[:2], len(random), _DRAWS))
@@ -104,12 +104,15 @@ def consistent(judged: Judged, found: Explained, low: Mapping[str, float], asses
     over = {channel: low[channel] / found.random[channel] for channel in found.left}
     most = max(over.values(), default=0.0) if found.improved_runs else math.inf
     test = "low end of the test error's interval over what noise and disturbance leave"
-    decision = Decision("mismatch", test, most, LARGE_ERROR, "large" if most > LARGE_ERROR else "not large")
+    decision = Decision(
+        "mismatch", test, most, settings.LARGE_ERROR, "large" if most > settings.LARGE_ERROR else "not large"
+    )
     judged = dataclasses.replace(judged, decisions=[*judged.decisions, decision])
-    if most <= LARGE_ERROR:
+    if most <= settings.LARGE_ERROR:
         return judged
-    large = f"Simulation error on the test runs is {sigmas({c: found.left[c] for c in over if over[c] > LARGE_ERROR})}"
-    why = large if found.improved_runs else "The model diverges on the test runs"
+    large = {channel: found.left[channel] for channel in over if over[channel] > settings.LARGE_ERROR}
+    size = f"Simulation error on the test runs is {sigmas(large)}"
+    why = size if found.improved_runs else "The model diverges on the test runs"
     note = f"{why}, although no missing effect is significant: the verdict is unknown and not none."
     p_value = judged.p_value if assessment.size is None else min(judged.p_value, assessment.size)
     return dataclasses.replace(judged, verdict="unknown", p_value=p_value, notes=[*judged.notes, note])

@@ -24,8 +24,8 @@ from scipy import special
 
 from ..arrays import quietly
 from ..estimate import Problem, Solution
+from . import settings
 from .products import conditional
-from .settings import BLOCKS, BLOCKS_ONE_STEP, CLEAR_LOG_BAYES, LEVEL, SIGNIFICANCE
 from .view import Parts, View
 
 
@@ -69,7 +69,7 @@ class Comparison(NamedTuple):
     @property
     def unlikelier(self) -> bool:
         """Whether it is clearly less probable one step ahead, significantly by blocks or not."""
-        return self.one_step.total < -CLEAR_LOG_BAYES
+        return self.one_step.total < -settings.CLEAR_LOG_BAYES
 
     @property
     def accepted(self) -> bool:
@@ -80,7 +80,7 @@ class Comparison(NamedTuple):
         """
         horizons = (self.one_step, self.simulation)
         better, worse = (min(getattr(gain, side) for gain in horizons) for side in ("better", "worse"))
-        return self.admissible and better < SIGNIFICANCE and not (self.unlikelier or worse < LEVEL)
+        return self.admissible and better < settings.SIGNIFICANCE and not (self.unlikelier or worse < settings.LEVEL)
 
 
 def compare(before: Predicted, after: Predicted, admissible: bool = True) -> Comparison:
@@ -114,9 +114,9 @@ def gain(before: Float[np.ndarray, " n"], after: Float[np.ndarray, " n"]) -> Gai
 
 def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     """`Predicted.one_step` of a view's vehicle under the view's disturbance."""
-    parts = view.products(view.base, view.disturbance, BLOCKS_ONE_STEP)
+    parts = view.products(view.base, view.disturbance, settings.BLOCKS_ONE_STEP)
     # what lies beyond the end of a short run has nothing
-    there = view.measured_by_part(BLOCKS_ONE_STEP) > 0
+    there = view.measured_by_part(settings.BLOCKS_ONE_STEP) > 0
     parts = Parts(*(own[there] for own in parts))
     gram = parts.products.sum(axis=0) + np.asarray(view.prior)
     if not np.all(np.isfinite(gram)):
@@ -125,9 +125,9 @@ def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
 
 
 @quietly
-def simulated(fit: Solution, blocks: int = BLOCKS, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
-    """`Predicted.simulation` of a fit, in so many `blocks` a run; the initial states may be `known_start`."""
-    products = _simulation_products(fit, blocks)
+def simulated(fit: Solution, blocks: int | None = None, *, known_start: bool = False) -> Float[np.ndarray, " l"]:
+    """`Predicted.simulation` of a fit, in `blocks` a run, else `BLOCKS`; initial states may be `known_start`."""
+    products = _simulation_products(fit, blocks or settings.BLOCKS)
     nowhere = np.full(products.shape[0] * products.shape[1], -np.inf)
     if not np.all(np.isfinite(products)):
         return nowhere

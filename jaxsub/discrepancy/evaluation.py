@@ -13,11 +13,11 @@ from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulation import simulate
 from ..vehicle import AbstractVehicle
+from . import settings
 from .acceptance import Model
 from .cross_validation import gain
 from .diagnosis import Gain, Overlay
 from .restarts import restarted
-from .settings import BLOCKS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,7 +85,7 @@ def test_gain(before: Evaluation, after: Evaluation, pieces: int) -> Gain:
 
     By Student's t over blocks of every run, no shorter than the pieces of a simulation.
     """
-    blocks = lambda one: np.concatenate([_sums(run, max(BLOCKS, pieces)) for run in one.squares])
+    blocks = lambda one: np.concatenate([_sums(run, max(settings.BLOCKS, pieces)) for run in one.squares])
     total = lambda one: float(sum(run.sum() for run in one.squares))
     return Gain(total(after) / max(total(before), 1e-300), gain(-blocks(before), -blocks(after)).better)
 

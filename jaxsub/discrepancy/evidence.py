@@ -28,14 +28,12 @@ from ..arrays import aligned_zeros
 from ..estimate import estimate_disturbance
 from ..likelihood import Columns, Disturbance, System, padded_width, run_products, with_constants
 from ..programs import on_cores
+from . import settings
 from .columns import EffectColumns, columns_of
 from .innovation_search import root_or_one
 from .products import Products, conditional
-from .settings import DISTURBANCE_SHARES, MOST_COLUMNS
 from .view import View
 
-# products that evidence begins with
-FIRST = len(DISTURBANCE_SHARES)
 # samples of a share of the runs, and bytes that columns may take which are kept from one pass to the next
 _SAMPLES, _MEMORY = 4096, 2**30
 
@@ -74,8 +72,8 @@ class Evidence:
         first = raw.under(own)
         length = root_or_one(np.diag(first.gram)[known:])
         made = dataclasses.replace(raw, length=length)
-        shares = [own, *(dataclasses.replace(own, force=share * own.force) for share in DISTURBANCE_SHARES[1:])]
-        for disturbance in disturbances or shares:
+        smaller = [dataclasses.replace(own, force=share * own.force) for share in settings.DISTURBANCE_SHARES]
+        for disturbance in disturbances or [own, *smaller]:
             made.products.append(first.scaled(made._unit) if disturbance is own else made.under(disturbance))
         return made
 
@@ -83,6 +81,11 @@ class Evidence:
     def _unit(self) -> Float[np.ndarray, " n"]:
         """What each column is divided by, the residual's and the free parameters' included."""
         return np.concatenate([np.ones(len(self.view.prior)), self.length])
+
+    @property
+    def given(self) -> list[Products]:
+        """The products under the view's disturbance and shares of it, before any other was estimated."""
+        return self.products[: 1 + len(settings.DISTURBANCE_SHARES)]
 
     @property
     def lengths(self) -> Float[np.ndarray, " n"]:
@@ -146,8 +149,8 @@ class Evidence:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
         own = self.within(chosen, self.best(chosen)[1])
         fixed = [c for c in chosen if c < len(self.columns)]
-        picked = own.picked(fixed).padded(MOST_COLUMNS)
-        worth = np.where(np.arange(MOST_COLUMNS) < len(fixed), 1.0 / self.products[0].samples, 1.0)
+        picked = own.picked(fixed).padded(settings.MOST_COLUMNS)
+        worth = np.where(np.arange(settings.MOST_COLUMNS) < len(fixed), 1.0 / self.products[0].samples, 1.0)
         prior = np.asarray(block_diag(self.view.prior, np.diag(worth)))
         system, columns = own.view.followed.system, own.view.base + picked
         found = estimate_disturbance(system, columns, prior, start)

@@ -17,6 +17,7 @@ from ..estimate import SearchEnd, evaluate, initial_guess, substeps_for
 from ..likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ..results import SUCCESSFUL
 from ..vehicle import AbstractVehicle
+from . import settings
 from .acceptance import Model, ModelFitter, fitted_model
 from .cross_validation import Comparison, compare, one_step_ahead, simulated
 from .evidence import evidence_of
@@ -24,7 +25,6 @@ from .model import amplitude_indices, refit, with_scaled_effects, without_variat
 from .programs import make_room
 from .restarts import restarted, starts
 from .selector import Selector
-from .settings import BLOCKS, FEWEST_SAMPLES, MOST_RESTARTS, RESTART_ERROR
 from .view import View, led_from, look
 
 
@@ -137,10 +137,10 @@ def segments_needed(view: View) -> int | None:
     runs, measured = view.runs, [view.measured(channel) for channel in view.vehicle.layout.channels]
     variance = np.array([np.var(values) if len(values) else np.inf for values in measured])
     pieces = 1
-    while pieces <= min(MOST_RESTARTS, runs.times.shape[1] // FEWEST_SAMPLES):
+    while pieces <= min(settings.MOST_RESTARTS, runs.times.shape[1] // settings.FEWEST_SAMPLES):
         shown = restarted(view.vehicle, view.followed, runs, pieces)
         rms = concentrated_sigma(residual_outputs(view.vehicle, runs, shown), runs)
-        if np.all(np.asarray(rms**2 - view.sigma**2) < RESTART_ERROR * variance):
+        if np.all(np.asarray(rms**2 - view.sigma**2) < settings.RESTART_ERROR * variance):
             return pieces
         pieces *= 2
     return None
@@ -151,6 +151,6 @@ def segmented(model: Model, pieces: int) -> Model:
     view = model.view
     runs, start = view.runs.segments(pieces), starts(view.followed, pieces)
     ended = SearchEnd(view.vehicle, runs, start, view.sigma, model.fit.cost, model.fit.steps, SUCCESSFUL)
-    blocks = max(1, BLOCKS // pieces)
+    blocks = max(1, settings.BLOCKS // pieces)
     predicted = model.predicted._replace(simulation=simulated(evaluate(ended), blocks, known_start=True))
     return Model(ended, view, predicted, model.added, pieces)

@@ -17,7 +17,7 @@ from ..arrays import quietly
 from ..estimate import Problem, by_cost, estimate_disturbance
 from ..likelihood import Columns, Disturbance, FilteredRuns, filter_runs
 from ..vehicle import AbstractVehicle
-from .settings import PRIOR_WIDTH
+from . import settings
 
 # dampings of a scoring step, of a column's squares, and shares of a change of the disturbance, tried in this order
 _DAMPINGS, _SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), (1.0, 0.5)
@@ -201,7 +201,7 @@ def root_or_one(squares: Float[np.ndarray, " q"]) -> Float[np.ndarray, " q"]:
 def with_wide_priors(problem: Problem) -> Problem:
     """A problem with a wide prior about each number of the file that has none."""
     vehicle, own = problem.vehicle, problem.vehicle.own_values()
-    width, given = PRIOR_WIDTH * np.abs(problem.prior_mean), [row.name in own for row in vehicle.layout.free]
+    width, given = settings.PRIOR_WIDTH * np.abs(problem.prior_mean), [row.name in own for row in vehicle.layout.free]
     wide = np.array(given, bool) & (width > 0.0) & np.isinf(problem.prior_std)
     return dataclasses.replace(problem, prior_std=jax.device_put(np.where(wide, width, problem.prior_std)))
 

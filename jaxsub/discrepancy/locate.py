@@ -13,6 +13,7 @@ import numpy as np
 from ..effects import AbstractEffect, AbstractInstrument, Motion, RunVariation, by_name, numbers, velocities
 from ..likelihood import Disturbance
 from ..recording import Recording
+from . import settings
 from .columns import columns_of, differences
 from .diagnosis import ForceTrace, Location, Regime
 from .effect_forces import Forces
@@ -20,7 +21,6 @@ from .evidence import Evidence
 from .process_noise import NoiseSignal
 from .regime import INCIDENCE, regime, regime_variables
 from .selector import Scan
-from .settings import PLACE_SHARE
 from .view import View, missing_force
 
 # missing force over its standard deviation from which it is significant, also where process noise rises too
@@ -131,7 +131,7 @@ def locations(field: Field, view: View, recordings: Sequence[Recording], share: 
     """The places with a share worth naming, the largest first."""
     found = []
     for place, part in sorted(share.items(), key=lambda item: -item[1]):
-        if part < PLACE_SHARE:
+        if part < settings.PLACE_SHARE:
             continue
         if place in view.vehicle.layout.equations:
             clear = [_clear(trace, place, field.signals) for trace in field.traces]

@@ -12,8 +12,8 @@ from ..estimate import AbstractSearchEnd, Solution, by_cost, evaluate, race, sea
 from ..information import coloured_covariance
 from ..vehicle import AbstractVehicle
 from ..vehicle.layout import deviation
+from . import settings
 from .products import integrated
-from .settings import NEGLIGIBLE, SIGNIFICANCE
 from .view import View
 
 # of a column whose squares are zero in floating point
@@ -73,7 +73,7 @@ def is_admissible(fit: AbstractSearchEnd, effects: Sequence[AbstractEffect]) -> 
     for effect in (e for e in fit.vehicle.all_effects if e.label in labels):
         found, linear, units = numbers(effect), amplitudes(effect), effect.units()
         times = {n for n in found if isinstance(effect, AbstractMemory) and units[n] == "s"}
-        least = {n: shortest if n in times else NEGLIGIBLE for n in found}
+        least = {n: shortest if n in times else settings.NEGLIGIBLE for n in found}
         vanished = any(v <= least[n] for n, v in found.items() if n not in linear)
         if vanished or not admissible(effect, found) or any(found[n] >= longest for n in times):
             return False
@@ -82,7 +82,7 @@ def is_admissible(fit: AbstractSearchEnd, effects: Sequence[AbstractEffect]) -> 
 
 def are_significant(view: View, effects: Sequence[AbstractEffect]) -> bool:
     """Whether each of `effects` is significant (`p_value`), all other parameters free."""
-    return all(p_value(view, effect) < SIGNIFICANCE for effect in effects)
+    return all(p_value(view, effect) < settings.SIGNIFICANCE for effect in effects)
 
 
 def p_value(view: View, effect: AbstractEffect) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy import special
 
-from .settings import SIGNIFICANCE
+from . import settings
 
 # of which a hundredth determine the quantile, to a tenth of its size
 _DRAWS, _SEED = 10_000, 0
@@ -40,8 +40,8 @@ def independent_tests(squares: Float[np.ndarray, "q q"], owners: Sequence[Sequen
         statistic = np.sum(b[at] * np.linalg.solve(G[np.ix_(at, at)] + precision * np.eye(len(at)), b[at]), axis=0)
         largest[len(at)] = np.maximum(largest.get(len(at), 0.0), statistic)
     p = np.min([special.chdtrc(size, most) for size, most in largest.items()], axis=0)
-    quantile = min(float(np.quantile(p, SIGNIFICANCE)), SIGNIFICANCE)
-    return float(np.log1p(-SIGNIFICANCE) / np.log1p(-quantile))
+    quantile = min(float(np.quantile(p, settings.SIGNIFICANCE)), settings.SIGNIFICANCE)
+    return float(np.log1p(-settings.SIGNIFICANCE) / np.log1p(-quantile))
 
 
 def family_wise(p_value: float, tests: float) -> float:

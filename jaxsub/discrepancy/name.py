@@ -14,21 +14,11 @@ from jaxtyping import Bool
 from scipy import special
 
 from ..effects import AbstractEffect, numbers
+from . import settings
 from .diagnosis import Candidate
 from .products import Products
 from .progress import Progress
 from .selector import Scan, Selector
-from .settings import (
-    DISTURBANCE_ESTIMATES,
-    ESTIMATED_LOG_BAYES,
-    MAJORITY,
-    MOST_EFFECTS,
-    MOST_SCORE_ERROR,
-    RIVAL_PROBABILITY,
-    RIVALS_FITTED,
-    SCORE_ERROR,
-    SIGNIFICANCE,
-)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,7 +80,7 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
         best = selector.foremost(chosen, scan)
         gain = scan.value[best] - selector.value(chosen)
         p_values.append(selector.p_value(best, scan) if np.isfinite(gain) else 1.0)
-        if not gain > 0.0 or p_values[-1] >= SIGNIFICANCE or len(chosen) == MOST_EFFECTS:
+        if not gain > 0.0 or p_values[-1] >= settings.SIGNIFICANCE or len(chosen) == settings.MOST_EFFECTS:
             return chosen, scans, p_values
         if not selector.predicts(chosen, best):
             selector.usable[best] = False
@@ -117,10 +107,11 @@ def _settled(selector: Selector, chosen: list[int]) -> Scan:
 
 def _led(selector: Selector, chosen: list[int]) -> Scan:
     """The scan with the disturbance estimated for the best candidate, or for the first few that were."""
-    for _ in range(DISTURBANCE_ESTIMATES):
+    for _ in range(settings.DISTURBANCE_ESTIMATES):
         scan = selector.scan(chosen)
         best = int(np.argmax(scan.value))
-        if not np.isfinite(scan.value[best]) or scan.value[best] - selector.value(chosen) < -ESTIMATED_LOG_BAYES:
+        gain = scan.value[best] - selector.value(chosen)
+        if not np.isfinite(gain) or gain < -settings.ESTIMATED_LOG_BAYES:
             return scan
         if tuple(sorted([*chosen, best])) in selector.estimated:
             return scan
@@ -175,17 +166,17 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
         key = effect.label if effect.name == own else effect.name
         if log[i] > log[best.setdefault(key, i)]:
             best[key] = i
-    rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > RIVAL_PROBABILITY]
+    rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > settings.RIVAL_PROBABILITY]
     # coefficients absorb the linearisation error as they absorb the effect, but not as exactly
-    off = min(MOST_SCORE_ERROR, SCORE_ERROR / np.sqrt(max(selector.kept[index], 1e-12)))
+    off = min(settings.MOST_SCORE_ERROR, settings.SCORE_ERROR / np.sqrt(max(selector.kept[index], 1e-12)))
     near = [j for key, j in best.items() if key != label and np.isfinite(log[j])]
     place = scan.effects[index].where
     # where a motion is no larger than its noise, the filtered trajectory favours the square of a rate over its cube
-    least = lambda j: MAJORITY if scan.effects[j].where == place else 1.0 - off
+    least = lambda j: settings.MAJORITY if scan.effects[j].where == place else 1.0 - off
     # simulation may select what is less probable by innovations than a rival, which then is fitted first
     alike = lambda j: scan.statistic[j] > least(j) * scan.statistic[index] or log[j] > log[index]
     near = [j for j in near if alike(j)]
-    collinear = sorted(near, key=lambda j: -log[j])[:RIVALS_FITTED]
+    collinear = sorted(near, key=lambda j: -log[j])[: settings.RIVALS_FITTED]
     rivals = sorted(rivals, key=lambda rival: -rival[1])
     return Named(index, scan.effects[index], min(1.0, by_name[own]), rivals, collinear)
 
@@ -196,8 +187,8 @@ def significant_beside(selector: Selector, others: Sequence[int], index: int, sc
     Then it is missing too, and no rival.
     """
     beside = selector.scan([*others, index])
-    asked = np.array([selector.p_value(i, beside) < SIGNIFICANCE for i in range(len(beside.value))])
-    return asked & (beside.statistic > MAJORITY * scan.statistic)
+    asked = np.array([selector.p_value(i, beside) < settings.SIGNIFICANCE for i in range(len(beside.value))])
+    return asked & (beside.statistic > settings.MAJORITY * scan.statistic)
 
 
 def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Named:
@@ -210,7 +201,7 @@ def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Na
     share = named.probability + sum(p for rival, p in named.rivals if rival.name in names)
     found = [(effect, share * float(w)) for (effect, _), w in zip(values, weights, strict=True)]
     others = [pair for pair in named.rivals if pair[0].name not in names]
-    others += [pair for pair in found if pair[0].name != named.effect.name and pair[1] > RIVAL_PROBABILITY]
+    others += [pair for pair in found if pair[0].name != named.effect.name and pair[1] > settings.RIVAL_PROBABILITY]
     probability = min(1.0, sum(p for effect, p in found if effect.name == named.effect.name))
     return dataclasses.replace(named, probability=probability, rivals=sorted(others, key=lambda pair: -pair[1]))
 
@@ -234,6 +225,6 @@ def table(selector: Selector, scan: Scan) -> list[Candidate]:
 def _outcome(usable: bool, right: bool, p_value: float) -> str:
     if not usable:
         return "absorbed by the coefficients"
-    if p_value >= SIGNIFICANCE:
+    if p_value >= settings.SIGNIFICANCE:
         return "not significant"
     return "significant" if right else "of inadmissible sign"

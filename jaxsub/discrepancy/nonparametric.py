@@ -13,10 +13,10 @@ from scipy import special
 
 from ..effects import KNOTS, SmoothForce, with_numbers
 from ..likelihood import Disturbance, smoothed
+from . import settings
 from .columns import columns_of
 from .evidence import Evidence
 from .products import Products, conditional
-from .settings import FORCE_DISTURBANCE_SHARES, LENGTH_SCALES, MAJORITY, SIGNIFICANCE
 from .smoothness import FINE, Smooth, coarse, smoothest
 from .spline_basis import basis_forces, promising_forces, smooth_forces
 from .view import Parts, View
@@ -50,12 +50,12 @@ class Pattern:
     @property
     def significant(self) -> bool:
         """Whether it is significant and predicts."""
-        return self.predicts and self.p_value < SIGNIFICANCE
+        return self.predicts and self.p_value < settings.SIGNIFICANCE
 
     @property
     def joins(self) -> bool:
         """Whether moreover its few knots are near enough to the fine ones for a model."""
-        return self.significant and self.near > MAJORITY
+        return self.significant and self.near > settings.MAJORITY
 
     @property
     def described(self) -> str:
@@ -102,7 +102,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     asked = [
         p.disturbance if share == 1.0 else dataclasses.replace(p.disturbance, force=share * p.disturbance.force)
         for p in under
-        for share in FORCE_DISTURBANCE_SHARES
+        for share in settings.FORCE_DISTURBANCE_SHARES
     ]
     # one force after the other: products between forces are not needed
     picked = chosen.columns.picked([c for c in columns if c < len(chosen.columns)])
@@ -114,7 +114,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     best = int(np.argmax([np.max(each) for each in values]))
     found, at = every[best], int(np.argmax(values[best]))
     gain = float(np.max(values[best])) - found.before
-    p_value = min(1.0, 0.5 * len(forces) * len(LENGTH_SCALES) * float(special.chdtrc(1, 2.0 * max(0.0, gain))))
+    p_value = min(1.0, 0.5 * len(forces) * len(settings.LENGTH_SCALES) * float(special.chdtrc(1, 2.0 * max(0.0, gain))))
     # the prior standard deviation counts as one parameter, and every force is equally probable a priori
     alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
     heights, size, explained = found.heights(at)

@@ -13,6 +13,7 @@ from ..findings import Finding
 from ..recording import Recording
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle, vehicle_findings
+from . import settings
 from .acceptance import Examination, Model, ModelFitter, fitted_model
 from .advice import next_manoeuvre
 from .consistency import consistent
@@ -27,7 +28,6 @@ from .model import with_coloured_errors
 from .name import Named
 from .process_noise import noise_note, noise_signals
 from .progress import Progress, limited
-from .settings import RIVALS_FITTED
 from .show import channel_quality, coefficients, estimates, replaced, run_quality, trades
 from .shown import shown_on
 from .structure_search import search_structure
@@ -212,7 +212,7 @@ def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVe
         return ()
     least = min(judged.named, key=lambda named: named.probability)
     without = improved.without_effect(least.effect.label)
-    rivals = [rival for rival, _ in least.rivals[:RIVALS_FITTED]]
+    rivals = [rival for rival, _ in least.rivals[: settings.RIVALS_FITTED]]
     return (improved, *(without.with_effect(rival) for rival in rivals))
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..effects import Motion, by_name
+from . import settings
 from .diagnosis import Regime
-from .settings import LEVEL
 from .spline_basis import STILL
 
 _SHIFTS = 199  # of the test by chance
@@ -53,7 +53,7 @@ def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.
         return None
     rng = np.random.default_rng(0)
     exceeded = [np.max(np.abs(_areas(ranks, _moved(inside, live, rng)[live]) - 0.5)) >= reached for _ in range(_SHIFTS)]
-    if (1 + np.sum(exceeded)) / (1 + _SHIFTS) > LEVEL:
+    if (1 + np.sum(exceeded)) / (1 + _SHIFTS) > settings.LEVEL:
         return None
     return _parted(names[best], variables[names[best]][live], inside[live], bool(areas[best] > 0.5))
 

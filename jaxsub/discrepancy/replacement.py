@@ -6,11 +6,11 @@ other only makes it less certain.
 
 import numpy as np
 
+from . import settings
 from .acceptance import Model, fitted_model
 from .cross_validation import compare
 from .model import refit, wald_p_value
 from .progress import Progress
-from .settings import SIGNIFICANCE
 from .verdict import Judged, replacing
 from .view import look
 
@@ -36,5 +36,5 @@ def replaceable(model: Model) -> list[str]:
         return []
     rows = model.view.vehicle.layout.free
     may = lambda row: row.name in asked and row.lower <= 0.0 <= row.upper and not row.varies
-    idle = lambda place: not wald_p_value(model.view, [place]) < SIGNIFICANCE
+    idle = lambda place: not wald_p_value(model.view, [place]) < settings.SIGNIFICANCE
     return [row.name for place, row in enumerate(rows) if may(row) and idle(place)]

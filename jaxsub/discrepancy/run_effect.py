@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from .settings import IDENTIFIABLE_SHARE
+from . import settings
 
 # standard deviations that are tried at first, of the largest that may be most probable, and then about the best
 _LEAST, _TRIED = 1e-5, 60
@@ -35,7 +35,7 @@ class RunEffect(NamedTuple):
         values, U = np.linalg.eigh(0.5 * (W + W.T))
         values, u = np.maximum(values, 0.0), U.T @ w
         # the smallest is of the mean
-        kept = (values > IDENTIFIABLE_SHARE * values[-1]) & (np.arange(len(values)) > 0)
+        kept = (values > settings.IDENTIFIABLE_SHARE * values[-1]) & (np.arange(len(values)) > 0)
         statistic = float(np.sum(u[kept] ** 2 / values[kept]))
         # each direction alone would have the square of it so large
         most = float(np.max((u[kept] / values[kept]) ** 2, initial=0.0))

@@ -10,22 +10,11 @@ from scipy import special
 
 from ..effects import AbstractEffect, RunVariation, admissible, admitted, amplitudes, numbers, with_numbers
 from ..likelihood import Disturbance
+from . import settings
 from .columns import plausible
-from .evidence import FIRST, Evidence
+from .evidence import Evidence
 from .multiplicity import family_wise, independent_tests
 from .products import Products
-from .settings import (
-    IDENTIFIABLE_SHARE,
-    LARGE_ERROR,
-    MAJOR_SHARE,
-    MAJORITY,
-    MINOR_SHARE,
-    MOST_COLUMNS,
-    NEGLIGIBLE,
-    PLAUSIBILITY_SCORE,
-    SIGNIFICANCE,
-    SIMULATION_RATIO,
-)
 from .view import View
 
 
@@ -95,7 +84,7 @@ class Selector:
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
         own = evidence.view.disturbance
         # a simulation has no disturbance that could absorb its error
-        still = Disturbance(NEGLIGIBLE * own.force, own.time, np.ones_like(own.noise))
+        still = Disturbance(settings.NEGLIGIBLE * own.force, own.time, np.ones_like(own.noise))
         self.free = evidence.under(still)
         self.lost = False
         forms = collections.Counter(effect.name for effect in self.candidates)
@@ -119,7 +108,7 @@ class Selector:
         self.kept = self.evidence.products[0].kept(self.owners)
         present = {effect.label for effect in self.evidence.view.vehicle.all_effects}
         absent = np.array([effect.label not in present for effect in self.candidates], bool)
-        self.usable = np.isfinite(self.kept) & (self.kept > IDENTIFIABLE_SHARE) & absent
+        self.usable = np.isfinite(self.kept) & (self.kept > settings.IDENTIFIABLE_SHARE) & absent
         asked = [self.owners[i] for i in np.flatnonzero(self.usable & ~self.varying)]
         squares, _ = self.evidence.products[0].remaining([], range(len(self.evidence.length)))
         # numbers that may differ by run have columns of their own, and count as one test each
@@ -168,15 +157,15 @@ class Selector:
         fresh = np.array([effect.label not in taken for effect in self.candidates], bool)
         right = self.usable & self._admitted(sizes) & fresh
         # worth a look only where it may be chosen
-        for i in np.flatnonzero(right & (statistic >= PLAUSIBILITY_SCORE)):
+        for i in np.flatnonzero(right & (statistic >= settings.PLAUSIBILITY_SCORE)):
             right[i] = plausible(self.evidence.view, effects[i])
-        fine = right & (len(own) + np.array([len(columns) for columns in self.owners]) <= MOST_COLUMNS)
+        fine = right & (len(own) + np.array([len(columns) for columns in self.owners]) <= settings.MOST_COLUMNS)
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, right)
 
     def hidden(self, chosen: Sequence[int]) -> list[int]:
         """The best candidates on top of `chosen` under smaller disturbances, which may have absorbed them."""
-        scans = [self.scan(chosen, under) for under in self.evidence.products[1:FIRST]]
+        scans = [self.scan(chosen, under) for under in self.evidence.given[1:]]
         leaders = {int(np.argmax(scan.value)): float(np.max(scan.value)) for scan in scans}
         return [index for index, value in leaders.items() if np.isfinite(value)]
 
@@ -207,9 +196,9 @@ class Selector:
         """
         best = int(np.argmax(scan.value))
         share = self.of_free_run(chosen)
-        if self.lost or share[best] > MINOR_SHARE:
+        if self.lost or share[best] > settings.MINOR_SHARE:
             return best
-        major = self._significant(chosen, scan) & (share > MAJOR_SHARE)
+        major = self._significant(chosen, scan) & (share > settings.MAJOR_SHARE)
         if not np.any(major):
             return best
         best = int(np.argmax(np.where(major, share, -np.inf)))
@@ -219,7 +208,7 @@ class Selector:
     def _significant(self, chosen: Sequence[int], scan: Scan) -> np.ndarray:
         """(m,) whether each candidate on top of `chosen` is significant and gains evidence."""
         p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
-        return (scan.value > self.value(chosen)) & (p_values < SIGNIFICANCE)
+        return (scan.value > self.value(chosen)) & (p_values < settings.SIGNIFICANCE)
 
     def ruling(self) -> np.ndarray:
         """(m,) the share of a simulation error far above the noise that each candidate alone explains.
@@ -228,9 +217,9 @@ class Selector:
         """
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
         share = self.of_free_run([])
-        if self.lost or not self.free.gram[0, 0] > LARGE_ERROR**2 * noise * self.free.samples:
+        if self.lost or not self.free.gram[0, 0] > settings.LARGE_ERROR**2 * noise * self.free.samples:
             return np.zeros_like(share)
-        return np.where((share > MAJORITY) & self._significant([], self.scan([])), share, 0.0)
+        return np.where((share > settings.MAJORITY) & self._significant([], self.scan([])), share, 0.0)
 
     def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate is an alternative to `index` on top of `chosen`.
@@ -240,7 +229,8 @@ class Selector:
         if index not in self.freely:
             return np.ones(len(self.candidates), bool)
         share = self.of_free_run(chosen)
-        return (1.0 - share <= SIMULATION_RATIO * (1.0 - share[index])) & (share >= share[index] / SIMULATION_RATIO)
+        ratio = settings.SIMULATION_RATIO
+        return (1.0 - share <= ratio * (1.0 - share[index])) & (share >= share[index] / ratio)
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
         """Whether `more` improves the prediction of parts of the recordings by the others, or of a simulation."""

@@ -13,8 +13,9 @@ from typing import Final
 LARGE_ERROR: Final[float] = 2.0
 # prior standard deviation of a coefficient that has none, in units of its size
 PRIOR_WIDTH: Final[float] = 10.0
-# disturbances under which evidence is computed, of the one estimated without candidates, which holds what is missing
-DISTURBANCE_SHARES: Final[tuple[float, ...]] = (1.0, 0.1, 0.003)
+# smaller disturbances under which evidence is computed, of the one estimated without candidates, which holds what is
+# missing
+DISTURBANCE_SHARES: Final[tuple[float, ...]] = (0.1, 0.003)
 # what counts as zero: of a simulation's disturbance, as a share of the estimated one; of a shape such as a lag, SI
 NEGLIGIBLE: Final[float] = 1e-6
 

@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import KNOTS
+from . import settings
 from .products import Products
-from .settings import LENGTH_SCALES
 from .spline_basis import hat_functions
 
 # three knots between any two of `SmoothForce`
@@ -51,7 +51,7 @@ def smoothest(products: Products, chosen: Sequence[int], hats: Sequence[int], le
     G, b = products.remaining(chosen, hats)
     G, b = G * np.outer(length, length), b * length
     best = Smooth(0.0, np.zeros_like(G), math.inf)
-    for L in _roots():
+    for L in _roots(settings.LENGTH_SCALES):
         values, U = np.linalg.eigh(L.T @ G @ L)
         values, c = np.maximum(values, 0.0), U.T @ (L.T @ b)
         sizes = _SIZES / max(float(values[-1]), 1e-300)
@@ -65,10 +65,10 @@ def smoothest(products: Products, chosen: Sequence[int], hats: Sequence[int], le
 
 
 @functools.cache
-def _roots() -> list[np.ndarray]:
-    """A root of the covariance of the heights for each scale."""
+def _roots(scales: tuple[float, ...]) -> list[np.ndarray]:
+    """A root of the covariance of the heights for each of some length scales."""
     apart = np.subtract.outer(np.arange(FINE), np.arange(FINE)) / (FINE - 1)
-    covariances = [np.exp(-0.5 * (apart / scale) ** 2) + _ROUNDING * np.eye(FINE) for scale in LENGTH_SCALES]
+    covariances = [np.exp(-0.5 * (apart / scale) ** 2) + _ROUNDING * np.eye(FINE) for scale in scales]
     return [np.linalg.cholesky(covariance) for covariance in covariances]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import KNOTS, SmoothForce, variables
-from .settings import BLOCKS, FORCE_RIDGE, FORCES_PER_EQUATION
+from . import settings
 from .view import View
 
 # positions, of which no force is a function
@@ -44,18 +44,21 @@ def promising_forces(view: View, forces: Sequence[SmoothForce], missing: np.ndar
     chosen: list[SmoothForce] = []
     for equation in equations:
         own = [force for force in forces if force.equation == equation]
-        chosen += sorted(own, key=lambda force: -predicted[force.variable][force.equation])[:FORCES_PER_EQUATION]
+        ranked = sorted(own, key=lambda force: -predicted[force.variable][force.equation])
+        chosen += ranked[: settings.FORCES_PER_EQUATION]
     return chosen
 
 
 def _predicted_share(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
     """(n,) share of each equation's missing force that the variable predicts in blocks by the other blocks."""
     drawn, live = hat_functions(_place(view, force)[0], _CHOOSING), view.path.steps > 0.0
-    pieces = [(r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), BLOCKS)]
+    pieces = [
+        (r, piece) for r, there in enumerate(live) for piece in np.array_split(np.flatnonzero(there), settings.BLOCKS)
+    ]
     H, y = [drawn[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
     G = np.array([h.T @ h for h in H])
     b, squares = np.array([h.T @ v for h, v in zip(H, y, strict=True)]), np.array([np.sum(v**2, axis=0) for v in y])
-    others = G.sum(axis=0) - G + FORCE_RIDGE * np.eye(_CHOOSING)
+    others = G.sum(axis=0) - G + settings.FORCE_RIDGE * np.eye(_CHOOSING)
     w = np.linalg.solve(others, b.sum(axis=0) - b)
     left = squares - 2.0 * np.sum(w * b, axis=1) + np.sum(w * (G @ w), axis=1)
     return 1.0 - left.sum(axis=0) / np.maximum(squares.sum(axis=0), 1e-300)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..effects import AbstractEffect, RunVariation
+from . import settings
 from .acceptance import CandidateModels, Model, ModelFitter, proposed_effects, without_insignificant
 from .cross_validation import Comparison, compare
 from .examine import listed, weighed
@@ -18,14 +19,6 @@ from .model import p_value
 from .name import Named, named_on, refitted, significant_beside, standing
 from .rivals import robust_log_evidence
 from .selector import Selector
-from .settings import (
-    CLEAR_LOG_BAYES,
-    DOMINANT_SHARE,
-    MOST_EFFECTS_ONE_STEP,
-    MOST_REJECTIONS,
-    RIVALS_FITTED,
-    SIGNIFICANCE,
-)
 from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
 
 
@@ -37,7 +30,7 @@ def stepwise_by_innovations(
     search = _Search(ahead, ahead.begin(base), vocabulary)
     best, named = search.start, list[Named]()
     judged, fallen, refusals = NOTHING, set[str](), 0
-    while len(best.added) < MOST_EFFECTS_ONE_STEP and refusals <= MOST_REJECTIONS:
+    while len(best.added) < settings.MOST_EFFECTS_ONE_STEP and refusals <= settings.MOST_REJECTIONS:
         selector = search.listed(best)
         selector.usable[[effect.label in fallen for effect in selector.candidates]] = False
         found = weighed(best.view, selector, fitter.progress)
@@ -136,16 +129,17 @@ class _Search:
             own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
             number = max(own, key=lambda i, value=scan.value: value[i])
             without, again = (selector.evidence.best(selector.columns(some))[0] for some in ([], [number]))
-            if np.isfinite(scan.value[number]) and whole - again < (1.0 - DOMINANT_SHARE) * (whole - without):
+            if np.isfinite(scan.value[number]) and whole - again < (1.0 - settings.DOMINANT_SHARE) * (whole - without):
                 break
         if not np.isfinite(scan.value[number]):
             return one, []
-        close = (scan.value > scan.value[number] - CLEAR_LOG_BAYES) & ~significant_beside(selector, [], number, scan)
+        close = scan.value > scan.value[number] - settings.CLEAR_LOG_BAYES
+        close &= ~significant_beside(selector, [], number, scan)
         close[own] = False
         others: dict[str, AbstractEffect] = {}
         for i in (i for i in np.argsort(-scan.value) if close[i]):
             others.setdefault(scan.effects[i].label, scan.effects[i])
-        return named_on(selector, [], number), [*others.values()][:RIVALS_FITTED]
+        return named_on(selector, [], number), [*others.values()][: settings.RIVALS_FITTED]
 
 
 def backward_eliminated(
@@ -157,12 +151,12 @@ def backward_eliminated(
         p_values = {one.effect.label: p_value(best.view, one.effect) for one in named}
         # first of all what is not significant, then what is not accepted, the least gain first
         asked = lambda label, gains=gains, p_values=p_values: (
-            -max(p_values[label], SIGNIFICANCE),
+            -max(p_values[label], settings.SIGNIFICANCE),
             gains[label].accepted,
             np.nan_to_num(gains[label].one_step.total),
         )
         worst = min(gains, key=asked)
-        if gains[worst].accepted and p_values[worst] < SIGNIFICANCE:
+        if gains[worst].accepted and p_values[worst] < settings.SIGNIFICANCE:
             return best, [*named], gains
         named = [one for one in named if one.effect.label != worst]
         best = ahead.replaced(start, best, worst)

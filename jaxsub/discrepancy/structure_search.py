@@ -5,6 +5,7 @@ from collections.abc import Callable, Generator, Sequence
 
 from ..effects import AbstractEffect
 from ..errors import InputError
+from . import settings
 from .acceptance import Examination, Model, ModelFitter, accept_proposed, proposed_effects
 from .cross_validation import compare
 from .evidence import evidence_of
@@ -12,7 +13,6 @@ from .examine import examine, weighed
 from .name import standing
 from .progress import OutOfTime
 from .replacement import with_replacement
-from .settings import EXPLAINED, MAJORITY, MOST_EFFECTS, MOST_REJECTIONS
 from .stepwise import stepwise_by_innovations
 from .verdict import NOTHING, Judged, both, by_fit, helped, idle, incomplete, judge, settled
 from .whiteness import share_of
@@ -95,12 +95,12 @@ def answers(
             if ahead is not None:
                 return ahead[0], both(judged, ahead[1]), None
             told_ahead = True
-            if said.verdict == "unknown" and refusals < MOST_REJECTIONS:
+            if said.verdict == "unknown" and refusals < settings.MOST_REJECTIONS:
                 refusals, after = refusals + 1, weighed(found.view, found.selector, fitter.progress)
         if after is None and not said.named:
             return best, judged, found
         whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.unexplained)
-        if (after is None and whole) or len(best.added) >= MOST_EFFECTS:
+        if (after is None and whole) or len(best.added) >= settings.MOST_EFFECTS:
             return best, judged, None
         if said.named:
             yield best, judged
@@ -163,7 +163,7 @@ def reconsidered(
     explain most but too little for the cause, if their fit explains enough: a large effect has a large linearisation
     error.
     """
-    most = found.nonparametric is None and found.memory.correlated and found.memory.explained > MAJORITY
+    most = found.nonparametric is None and found.memory.correlated and found.memory.explained > settings.MAJORITY
     named = found.naming.named
     here = [one.number for one in (named if most else [o for o in named if found.nonparametric in o.effect.where][:1])]
     best, said = accept_proposed(fitter, base, found, here, judged) if here else (base, judged)
@@ -171,7 +171,8 @@ def reconsidered(
         return base, judged, None
     more = examine(best.view, vocabulary, fitter.progress)
     share = _explained(base, best, more)
-    stands = more.nonparametric is None and share >= EXPLAINED if most else more.nonparametric != found.nonparametric
+    enough = more.nonparametric is None and share >= settings.EXPLAINED
+    stands = enough if most else more.nonparametric != found.nonparametric
     return (best, by_fit(said, share) if most else said, more) if stands else (base, judged, None)
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from ..effects import AbstractEffect, RunVariation, SmoothForce
+from . import settings
 from .consistency import sigmas
 from .diagnosis import Explained, Location, Physics, Rival, Verdict
-from .settings import LARGE_ERROR, SIGNIFICANCE
 
 
 def summary(
@@ -74,12 +74,13 @@ def _named(one: Physics | Rival) -> str:
 
 
 def _nothing(found: Explained | None, p_value: float) -> str:
-    start = "No missing effect is significant" if p_value >= SIGNIFICANCE else "No missing effect holds on the test run"
+    why_none = "is significant" if p_value >= settings.SIGNIFICANCE else "holds on the test run"
+    start = f"No missing effect {why_none}"
     if found is None:
         return f"{start}."
     if not found.left:
         return f"{start}: the model explains the recordings, and the test run to its noise."
-    large = {channel: value for channel, value in found.random.items() if found.left[channel] > LARGE_ERROR}
+    large = {channel: value for channel, value in found.random.items() if found.left[channel] > settings.LARGE_ERROR}
     why = f"; noise and random disturbance forces leave {sigmas(large)}" if large else ""
     return f"{start}, but the simulation error on the test run is more than its noise: {sigmas(found.left)}{why}."
 

@@ -13,23 +13,14 @@ import numpy as np
 
 from ..effects import AbstractEffect, AbstractInstrument, RunVariation, parameter_table
 from ..likelihood import Disturbance
+from . import settings
 from .acceptance import Examination, Model, ModelFitter
 from .cross_validation import compare
-from .evidence import FIRST
 from .examine import listed, weighed
 from .model import is_admissible, with_coloured_errors
 from .products import Products
 from .progress import OutOfTime
 from .selector import Selector
-from .settings import (
-    FORCE_SPREADS,
-    MOST_EFFECTS,
-    PLACE_SHARE,
-    SURROGATE_FITS,
-    SURROGATE_GAIN,
-    SURROGATE_INFLATION,
-    SURROGATE_ROUNDS,
-)
 from .verdict import Judged, helped, incomplete, standing_in
 
 
@@ -58,7 +49,7 @@ def _described(
     vocabulary: tuple[type[AbstractEffect], ...] | None,
 ) -> tuple[Model, Judged]:
     model, selector, fallen = named, found.selector, set[str]()
-    for _ in range(SURROGATE_ROUNDS if found.unexplained else 0):
+    for _ in range(settings.SURROGATE_ROUNDS if found.unexplained else 0):
         more = _with_more(fitter, named, model, selector, fallen)
         if more is None:
             break
@@ -81,9 +72,9 @@ def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Select
     left_out = lambda: [effect.label in fallen for effect in selector.candidates]
     selector.usable[left_out()] = False
     fits, disturbance = 0, selector.evidence.best([])[1].disturbance
-    for products in (selector.free, *reversed(selector.evidence.products[:FIRST])):
+    for products in (selector.free, *reversed(selector.evidence.given)):
         asked = most_explaining(selector, products)
-        while asked and fits < SURROGATE_FITS:
+        while asked and fits < settings.SURROGATE_FITS:
             more, fits = _fitted(fitter, named, model, asked, disturbance), fits + 1
             wrong = {effect.label for effect in asked if not is_admissible(more.fit, [effect])}
             if wrong:
@@ -104,7 +95,7 @@ def _worth(model: Model, more: Model) -> bool:
     A significant but negligible change would cost another round of fits.
     """
     gain = compare(model.predicted, more.predicted)
-    better = gain.ratio < 1.0 - SURROGATE_GAIN and float(more.fit.cost) < float(model.fit.cost)
+    better = gain.ratio < 1.0 - settings.SURROGATE_GAIN and float(more.fit.cost) < float(model.fit.cost)
     return more.view.finite and gain.accepted and better
 
 
@@ -118,7 +109,7 @@ def _fitted(
     if not free or not is_admissible(more.fit, effects) or not float(more.fit.cost) < float(model.fit.cost):
         return more
     before, after = (with_coloured_errors(one.view, one.fit).standard_errors for one in (named, more))
-    if all(after[name] < SURROGATE_INFLATION * before[name] for name in free):
+    if all(after[name] < settings.SURROGATE_INFLATION * before[name] for name in free):
         return more
     return fitter.with_effects(_holding(model, named, own), effects, disturbance)
 
@@ -137,13 +128,13 @@ def most_explaining(selector: Selector, products: Products) -> list[AbstractEffe
     Sensor effects are left out: they do not describe the vehicle. So is what differs by run, which predicts no other.
     """
     chosen: list[int] = []
-    while len(chosen) < MOST_EFFECTS:
+    while len(chosen) < settings.MOST_EFFECTS:
         share = products.explained(selector.columns(chosen), selector.owners)
         taken = {selector.candidates[i].label for i in chosen}
         may = [int(i) for i in np.argsort(-share) if selector.usable[i] and selector.candidates[i].label not in taken]
         moves = (i for i in may if not isinstance(selector.candidates[i], AbstractInstrument | RunVariation))
         best = next((i for i in moves if selector.predicted(chosen, i, products)[1]), None)
-        if best is None or share[best] < PLACE_SHARE:
+        if best is None or share[best] < settings.PLACE_SHARE:
             break
         chosen.append(best)
     beside = [selector.predicted([j for j in chosen if j != i], i, products) for i in chosen]
@@ -162,7 +153,7 @@ def _with_force(
         return base, judged
     force, disturbance = found.pattern.force, found.naming.products.disturbance
     last = np.inf
-    for share in FORCE_SPREADS:
+    for share in settings.FORCE_SPREADS:
         less = dataclasses.replace(force, spread=share * force.spread)
         more = _fitted(fitter, named, base, [less], disturbance)
         gain = compare(base.predicted, more.predicted, more.admissible)

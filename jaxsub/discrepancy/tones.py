@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy import fft
 
-from .settings import TONE_BACKGROUND, TONES
+from . import settings
 
 _LINES = 4  # spectral lines between independent frequencies
 
@@ -33,11 +33,11 @@ def tones(
     omega = 2.0 * np.pi * fft.rfftfreq(size, interval)
     inside = (omega >= band[0]) & (omega <= band[1])
     power = np.abs(whole) ** 2
-    around = ndimage.median_filter(power, (2 * _LINES * TONE_BACKGROUND + 1, 1), mode="nearest")
+    around = ndimage.median_filter(power, (2 * _LINES * settings.TONE_BACKGROUND + 1, 1), mode="nearest")
     height = (power / np.maximum(around, 1e-300))[inside]
     found = []
     for column in height.T:
         peaks, _ = signal.find_peaks(column, distance=_LINES + 2)
-        best = peaks[np.argsort(-column[peaks])[:TONES]]
+        best = peaks[np.argsort(-column[peaks])[: settings.TONES]]
         found.append(tuple(float(w) for w in omega[inside][best]))
     return found, int(np.sum(inside)) // _LINES

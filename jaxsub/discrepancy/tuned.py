@@ -12,10 +12,10 @@ import dataclasses
 import numpy as np
 
 from ..effects import Facts
+from . import settings
 from .columns import columns_of
 from .evidence import Evidence
 from .products import Products
-from .settings import TONE_SCORE
 from .view import View
 
 # of independent frequencies, of which a step is no more than one: the smallest step that is worth another
@@ -64,5 +64,5 @@ def _of(products: Products, length: np.ndarray, count: int) -> tuple[np.ndarray,
     wave = products.gains([], [[4 * i, 4 * i + 1] for i in range(count)])
     near = products.gains([], [range(4 * i, 4 * i + 4) for i in range(count)])
     a, b, p, q = (np.stack(near.amplitudes) / length.reshape(count, 4)).T
-    step = np.where(wave.statistic > TONE_SCORE, (b * q - a * p) / np.maximum(a * a + b * b, 1e-300), 0.0)
+    step = np.where(wave.statistic > settings.TONE_SCORE, (b * q - a * p) / np.maximum(a * a + b * b, 1e-300), 0.0)
     return products.log_evidence([]) + wave.evidence, step

@@ -13,8 +13,8 @@ from scipy import special
 from ..likelihood.whiteness import portmanteau
 from ..recording import Recording
 from ..vehicle import Layout
+from . import settings
 from .diagnosis import Remainder
-from .settings import BLOCKS, LEVEL, RESIDUAL_LEVEL
 
 _DELAYS = 60  # from one sample to a quarter of the longest run
 _STILL = 1e-9  # of its size: what moves less is rounding
@@ -49,8 +49,8 @@ def remainders(
 def beyond_noise(left: dict[str, Remainder], rms: dict[str, float], layout: Layout) -> list[str]:
     """One line: the channels of stated noise whose simulation error is larger than it and correlated."""
     stated = [output.name for output in layout.outputs if output.sigma is not None]
-    found = [c for c in stated if left[c].low > 1.0 and left[c].random < RESIDUAL_LEVEL]
-    led = lambda one: f", with {one.follows}" if one.independent < RESIDUAL_LEVEL else ""
+    found = [c for c in stated if left[c].low > 1.0 and left[c].random < settings.RESIDUAL_LEVEL]
+    led = lambda one: f", with {one.follows}" if one.independent < settings.RESIDUAL_LEVEL else ""
     said = ", ".join(f"{c} ({rms[c]:.2g} σ{led(left[c])})" for c in found)
     return [f"Simulation of the test runs leaves more than noise in {said}."] if found else []
 
@@ -82,14 +82,14 @@ def _interval(residual: Samples, measured: Bool[np.ndarray, "r k"]) -> tuple[flo
 
     Neighbours go together, so it is blocks that are independent. Source: Cochran (1977), Sampling Techniques, ch. 6.
     """
-    blocks = lambda of: np.concatenate([part.sum(axis=1) for part in np.array_split(of, BLOCKS, axis=1)])
+    blocks = lambda of: np.concatenate([part.sum(axis=1) for part in np.array_split(of, settings.BLOCKS, axis=1)])
     squares, counts = blocks(residual**2), blocks(measured)
     squares, counts = squares[counts > 0], counts[counts > 0]
     mean, n = squares.sum() / counts.sum(), len(counts)
     if n < 2 or mean == 0.0:
         return (0.0, 0.0) if mean == 0.0 else (0.0, np.inf)
     error = np.sqrt(n / (n - 1) * np.sum((squares - mean * counts) ** 2)) / counts.sum()
-    spread = np.exp(0.5 * special.stdtrit(n - 1, 1.0 - LEVEL / 2.0) * error / mean)
+    spread = np.exp(0.5 * special.stdtrit(n - 1, 1.0 - settings.LEVEL / 2.0) * error / mean)
     return float(np.sqrt(mean) / spread), float(np.sqrt(mean) * spread)
 
 

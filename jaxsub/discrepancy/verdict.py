@@ -5,12 +5,12 @@ import math
 from collections.abc import Sequence
 
 from ..effects import AbstractEffect
+from . import settings
 from .cross_validation import Comparison, Gain
 from .decisions import Decision
 from .diagnosis import Verdict
 from .name import Named, Naming
 from .nonparametric import Pattern
-from .settings import CERTAIN, CLEAR_LOG_BAYES, EXPLAINED, RESIDUAL_LEVEL, SIGNIFICANCE, UNEXPLAINED_LEVEL
 from .whiteness import Memory
 
 
@@ -69,13 +69,14 @@ def _tests(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory)
     """The tests of one examination."""
     choice = "proposed" if naming.named else "not proposed"
     score = "p-value of the largest score, corrected for all candidates"
-    said = [Decision(labels or "mismatch", score, naming.first_p, SIGNIFICANCE, choice)]
+    said = [Decision(labels or "mismatch", score, naming.first_p, settings.SIGNIFICANCE, choice)]
     if pattern is not None:
         outcome = "significant" if pattern.significant else "not significant"
         test = "p-value of a nonparametric force, corrected for all tried"
-        said.append(Decision(pattern.force.label, test, pattern.p_value, SIGNIFICANCE, outcome))
+        said.append(Decision(pattern.force.label, test, pattern.p_value, settings.SIGNIFICANCE, outcome))
     outcome = "correlated" if memory.correlated else "white"
-    return [*said, Decision("mismatch", "p-value of white innovations", memory.p_value, RESIDUAL_LEVEL, outcome)]
+    test = "p-value of white innovations"
+    return [*said, Decision("mismatch", test, memory.p_value, settings.RESIDUAL_LEVEL, outcome)]
 
 
 def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory) -> list[tuple[Decision, str]]:
@@ -88,12 +89,13 @@ def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory
     if pattern is not None:
         lead = pattern.alone - naming.value
         note = f"{labels} has the highest evidence in the vocabulary, and less than a nonparametric force alone."
-        tested("log evidence of a nonparametric force over theirs", lead, CLEAR_LOG_BAYES, lead > CLEAR_LOG_BAYES, note)
+        test, clear = "log evidence of a nonparametric force over theirs", settings.CLEAR_LOG_BAYES
+        tested(test, lead, clear, lead > clear, note)
     shares = {"a nonparametric force": pattern.explained} if pattern is not None else {}
     shares |= {"correlated innovations": memory.explained} if memory.correlated else {}
     for beside, share in shares.items():
         note = f"{labels} would explain {share:.0%} of the mismatch beside {beside}, too little for its cause."
-        tested(f"share explained beside {beside}", share, EXPLAINED, share < EXPLAINED, note)
+        tested(f"share explained beside {beside}", share, settings.EXPLAINED, share < settings.EXPLAINED, note)
     return said
 
 
@@ -108,10 +110,11 @@ def _decisions(label: str, gain: Comparison) -> list[Decision]:
     outcome = "accepted" if gain.accepted else "rejected"
     horizons = {"one step ahead": gain.one_step, "simulation": gain.simulation}
     test = "p-value of the gain in cross-validated log predictive density"
-    said = [Decision(label, f"{test}, {name}", one.better, SIGNIFICANCE, outcome) for name, one in horizons.items()]
+    level = settings.SIGNIFICANCE
+    said = [Decision(label, f"{test}, {name}", one.better, level, outcome) for name, one in horizons.items()]
     if gain.unlikelier:
         test = "gain in cross-validated log predictive density, one step ahead"
-        said.append(Decision(label, test, gain.one_step.total, -CLEAR_LOG_BAYES, outcome))
+        said.append(Decision(label, test, gain.one_step.total, -settings.CLEAR_LOG_BAYES, outcome))
     if not gain.admissible:
         said.append(Decision(label, "admissible and significant numbers", 0.0, 1.0, outcome))
     return said
@@ -185,8 +188,9 @@ def settled(judged: Judged, stand: list[Named]) -> Judged:
         return dataclasses.replace(judged, named=stand, verdict=_certainty(stand))
     if not judged.named:
         return judged
-    return dataclasses.replace(judged, verdict="unknown" if judged.p_value < UNEXPLAINED_LEVEL else "none", named=[])
+    missed: Verdict = "unknown" if judged.p_value < settings.UNEXPLAINED_LEVEL else "none"
+    return dataclasses.replace(judged, verdict=missed, named=[])
 
 
 def _certainty(named: Sequence[Named]) -> Verdict:
-    return "named" if all(one.probability >= CERTAIN for one in named) else "ambiguous"
+    return "named" if all(one.probability >= settings.CERTAIN for one in named) else "ambiguous"

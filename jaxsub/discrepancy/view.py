@@ -26,8 +26,8 @@ from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle, numbers_that_may_vary, quantities_of
+from . import settings
 from .innovation_search import InnovationSearch, Iterate, distinct, with_wide_priors
-from .settings import BLOCKS, FEWEST_RUNS, LARGE_ERROR, PLACE_SHARE
 from .tones import tones
 from .whiteness import record_sigma
 
@@ -80,7 +80,7 @@ class View:
         Every run is cut into so many `pieces`, or so that there are at least four parts.
         """
         system = self.followed.system
-        pieces = pieces or max(1, -(-BLOCKS // len(system.measured)))
+        pieces = pieces or max(1, -(-settings.BLOCKS // len(system.measured)))
         found, spreads = part_products(disturbance, system, columns, pieces)
         return Parts(found.reshape(-1, *found.shape[2:]), spreads.reshape(-1))
 
@@ -113,7 +113,7 @@ def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVe
     values a hundred times too large could absorb an actuator's force.
     """
     problem, rms = with_wide_priors(fit.problem), fit.rms
-    much = max(rms.values()) > LARGE_ERROR
+    much = max(rms.values()) > settings.LARGE_ERROR
     search = InnovationSearch(problem, problem.guess if much else _trusted(fit))
     guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.start_std), noise=_white(fit))
     vehicles = [fit.vehicle, *([near] if much and near is not None else [])]
@@ -177,7 +177,7 @@ def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturb
     Of one for each channel with a large misfit; that of the others is then attributed to forces.
     """
     noisy = np.maximum(guess.noise, rms)
-    alone = [np.where(own, noisy, guess.noise) for own in np.diag(rms > LARGE_ERROR) if own.any()]
+    alone = [np.where(own, noisy, guess.noise) for own in np.diag(rms > settings.LARGE_ERROR) if own.any()]
     every = Disturbance(_QUIET * np.asarray(guess.force), guess.time, noisy)
     return every, [dataclasses.replace(guess, noise=noise) for noise in alone]
 
@@ -245,7 +245,7 @@ def facts(view: View) -> Facts:
         fixed_gains=view.vehicle.fixed_gains,
         density=view.vehicle.density,
         speed=view.vehicle.speed,
-        varying=_varying(view) if len(runs.times) >= FEWEST_RUNS else (),
+        varying=_varying(view) if len(runs.times) >= settings.FEWEST_RUNS else (),
     )
 
 
@@ -275,7 +275,8 @@ def _varying(view: View) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
         names, squares = layout.equations, force
         if not np.any(force):
             names, squares = tuple(f"sensor:{c}" for c in layout.channels), np.sum(shown[..., i] ** 2, axis=(0, 1))
-        places = tuple(e for e, part in zip(names, squares, strict=True) if part > PLACE_SHARE * np.sum(squares))
+        least = settings.PLACE_SHARE * np.sum(squares)
+        places = tuple(e for e, part in zip(names, squares, strict=True) if part > least)
         found.append((row.name, row.unit, places))
     return tuple(found)
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..likelihood.whiteness import portmanteau, remembered
-from .settings import RESIDUAL_LEVEL
+from . import settings
 
 
 class Memory(NamedTuple):
@@ -26,7 +26,7 @@ class Memory(NamedTuple):
     @property
     def correlated(self) -> bool:
         """Whether they are not."""
-        return self.p_value < RESIDUAL_LEVEL
+        return self.p_value < settings.RESIDUAL_LEVEL
 
 
 RANDOM = Memory(1.0, 1.0)

@@ -9,8 +9,8 @@ import numpy as np
 import tomlkit
 from markupsafe import Markup
 
+from ..discrepancy import settings
 from ..discrepancy.diagnosis import ChannelQuality, Conclusions, Location, Regime, Remainder
-from ..discrepancy.settings import RESIDUAL_LEVEL
 from ..effects import FORCE_UNITS
 from ..findings import Finding
 from .text import (
@@ -228,11 +228,11 @@ def _between(left: Remainder) -> CheckCell:
 
 
 def _random(left: Remainder) -> CheckCell:
-    return CheckCell(p_value(left.random), left.random < RESIDUAL_LEVEL)
+    return CheckCell(p_value(left.random), left.random < settings.RESIDUAL_LEVEL)
 
 
 def _follows(left: Remainder) -> CheckCell:
-    flagged = left.independent < RESIDUAL_LEVEL
+    flagged = left.independent < settings.RESIDUAL_LEVEL
     return CheckCell(p_value(left.independent) + (f" ({left.follows})" if flagged else ""), flagged)
 
 

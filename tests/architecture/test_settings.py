@@ -113,14 +113,28 @@ def test_the_search_for_numbers_finds_every_form():
     assert compared_numbers(tree) == {5.0, 0.3}
 
 
+def _read(tree):
+    """The names that a module reads as attributes of the settings."""
+    attributes = (node for node in ast.walk(tree) if isinstance(node, ast.Attribute))
+    return {node.attr for node in attributes if ast.unparse(node.value) == "settings"}
+
+
+def test_settings_are_read_where_they_are_used():
+    """Claim: no module of the room keeps a setting of its own, so that another value holds in all of a diagnosis."""
+    for path in FILES:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        whole = [node for node in tree.body if not isinstance(node, ast.FunctionDef | ast.ClassDef)]
+        defaults = [node.args for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.Lambda)]
+        assert not set().union(*map(_read, [*whole, *defaults])), f"{path.name} reads settings as it is imported"
+        named = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+        assert "settings" not in named, f"{path.name} imports values of settings"
+
+
 def test_every_setting_is_typed_explained_and_read_by_another_module():
     """Claim: each is annotated as final, has a comment directly above it, and is read in the room."""
     lines = (ROOM / "settings.py").read_text(encoding="utf-8").splitlines()
     nodes = [node for node in SETTINGS.body if isinstance(node, ast.Assign | ast.AnnAssign)]
-    read = set()
-    for path in FILES:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        read |= {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+    read = set().union(*(_read(ast.parse(path.read_text(encoding="utf-8"))) for path in FILES))
     for node in nodes:
         assert isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation).startswith("Final["), ast.unparse(node)
         assert lines[node.lineno - 2].startswith("# "), ast.unparse(node)

@@ -19,7 +19,7 @@ class Slow(Selector):
     def __init__(self, own):
         self.own, self.candidates = own, [CubicDamping(place, -1.0) for place in "abcde"]
         self.usable, self.freely, self.estimated = np.ones(5, bool), set(), set()
-        self.evidence = SimpleNamespace(products=["all", "a tenth", "hardly any"])
+        self.evidence = SimpleNamespace(given=["all", "a tenth", "hardly any"])
 
     def value(self, chosen):
         return self.own if LAST in chosen else 0.0
