@@ -149,8 +149,8 @@ class Evidence:
         """The products under the disturbance that is left with the candidate columns `chosen` in the model."""
         own = self.within(chosen, self.best(chosen)[1])
         fixed = [c for c in chosen if c < len(self.columns)]
-        picked = own.picked(fixed).padded(settings.MOST_COLUMNS)
-        worth = np.where(np.arange(settings.MOST_COLUMNS) < len(fixed), 1.0 / self.products[0].samples, 1.0)
+        picked = own.picked(fixed).padded(most_columns())
+        worth = np.where(np.arange(most_columns()) < len(fixed), 1.0 / self.products[0].samples, 1.0)
         prior = np.asarray(block_diag(self.view.prior, np.diag(worth)))
         system, columns = own.view.followed.system, own.view.base + picked
         found = estimate_disturbance(system, columns, prior, start)
@@ -176,6 +176,11 @@ class Evidence:
         values = [products.log_evidence(chosen) for products in self.products]
         best = int(np.argmax(values))
         return values[best], self.products[best]
+
+
+def most_columns() -> int:
+    """The columns of effects that one selection takes, for which the disturbance's program has room."""
+    return 2 * settings.MOST_EFFECTS
 
 
 def _shares(system: System) -> list[slice]:

@@ -137,7 +137,7 @@ def segments_needed(view: View) -> int | None:
     runs, measured = view.runs, [view.measured(channel) for channel in view.vehicle.layout.channels]
     variance = np.array([np.var(values) if len(values) else np.inf for values in measured])
     pieces = 1
-    while pieces <= min(settings.MOST_RESTARTS, runs.times.shape[1] // settings.FEWEST_SAMPLES):
+    while pieces <= runs.times.shape[1] // settings.FEWEST_SAMPLES:
         shown = restarted(view.vehicle, view.followed, runs, pieces)
         rms = concentrated_sigma(residual_outputs(view.vehicle, runs, shown), runs)
         if np.all(np.asarray(rms**2 - view.sigma**2) < settings.RESTART_ERROR * variance):

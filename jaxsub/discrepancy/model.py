@@ -18,6 +18,8 @@ from .view import View
 
 # of a column whose squares are zero in floating point
 _NO_COLUMN = 1e-100
+# a shape so small is zero, SI
+_VANISHED = 1e-6
 
 
 def fit_with(
@@ -73,7 +75,7 @@ def is_admissible(fit: AbstractSearchEnd, effects: Sequence[AbstractEffect]) -> 
     for effect in (e for e in fit.vehicle.all_effects if e.label in labels):
         found, linear, units = numbers(effect), amplitudes(effect), effect.units()
         times = {n for n in found if isinstance(effect, AbstractMemory) and units[n] == "s"}
-        least = {n: shortest if n in times else settings.NEGLIGIBLE for n in found}
+        least = {n: shortest if n in times else _VANISHED for n in found}
         vanished = any(v <= least[n] for n, v in found.items() if n not in linear)
         if vanished or not admissible(effect, found) or any(found[n] >= longest for n in times):
             return False

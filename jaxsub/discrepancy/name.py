@@ -107,7 +107,7 @@ def _settled(selector: Selector, chosen: list[int]) -> Scan:
 
 def _led(selector: Selector, chosen: list[int]) -> Scan:
     """The scan with the disturbance estimated for the best candidate, or for the first few that were."""
-    for _ in range(settings.DISTURBANCE_ESTIMATES):
+    for _ in range(1 + settings.ALTERNATIVES):
         scan = selector.scan(chosen)
         best = int(np.argmax(scan.value))
         gain = scan.value[best] - selector.value(chosen)
@@ -176,7 +176,7 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     # simulation may select what is less probable by innovations than a rival, which then is fitted first
     alike = lambda j: scan.statistic[j] > least(j) * scan.statistic[index] or log[j] > log[index]
     near = [j for j in near if alike(j)]
-    collinear = sorted(near, key=lambda j: -log[j])[: settings.RIVALS_FITTED]
+    collinear = sorted(near, key=lambda j: -log[j])[: settings.ALTERNATIVES]
     rivals = sorted(rivals, key=lambda rival: -rival[1])
     return Named(index, scan.effects[index], min(1.0, by_name[own]), rivals, collinear)
 

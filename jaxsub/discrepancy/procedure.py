@@ -212,7 +212,7 @@ def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVe
         return ()
     least = min(judged.named, key=lambda named: named.probability)
     without = improved.without_effect(least.effect.label)
-    rivals = [rival for rival, _ in least.rivals[: settings.RIVALS_FITTED]]
+    rivals = [rival for rival, _ in least.rivals[: settings.ALTERNATIVES]]
     return (improved, *(without.with_effect(rival) for rival in rivals))
 
 

@@ -12,10 +12,13 @@ from ..effects import AbstractEffect, RunVariation, admissible, admitted, amplit
 from ..likelihood import Disturbance
 from . import settings
 from .columns import plausible
-from .evidence import Evidence
+from .evidence import Evidence, most_columns
 from .multiplicity import family_wise, independent_tests
 from .products import Products
 from .view import View
+
+# of the estimated disturbance: so small that it absorbs nothing of a simulation's error, and not singular
+_STILL = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,7 +87,7 @@ class Selector:
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
         own = evidence.view.disturbance
         # a simulation has no disturbance that could absorb its error
-        still = Disturbance(settings.NEGLIGIBLE * own.force, own.time, np.ones_like(own.noise))
+        still = Disturbance(_STILL * own.force, own.time, np.ones_like(own.noise))
         self.free = evidence.under(still)
         self.lost = False
         forms = collections.Counter(effect.name for effect in self.candidates)
@@ -159,7 +162,7 @@ class Selector:
         # worth a look only where it may be chosen
         for i in np.flatnonzero(right & (statistic >= settings.PLAUSIBILITY_SCORE)):
             right[i] = plausible(self.evidence.view, effects[i])
-        fine = right & (len(own) + np.array([len(columns) for columns in self.owners]) <= settings.MOST_COLUMNS)
+        fine = right & (len(own) + np.array([len(columns) for columns in self.owners]) <= most_columns())
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, right)
 
@@ -229,8 +232,8 @@ class Selector:
         if index not in self.freely:
             return np.ones(len(self.candidates), bool)
         share = self.of_free_run(chosen)
-        ratio = settings.SIMULATION_RATIO
-        return (1.0 - share <= ratio * (1.0 - share[index])) & (share >= share[index] / ratio)
+        most = settings.MAJORITY
+        return (most * (1.0 - share) <= 1.0 - share[index]) & (share >= most * share[index])
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
         """Whether `more` improves the prediction of parts of the recordings by the others, or of a simulation."""

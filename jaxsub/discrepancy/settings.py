@@ -16,8 +16,6 @@ PRIOR_WIDTH: Final[float] = 10.0
 # smaller disturbances under which evidence is computed, of the one estimated without candidates, which holds what is
 # missing
 DISTURBANCE_SHARES: Final[tuple[float, ...]] = (0.1, 0.003)
-# what counts as zero: of a simulation's disturbance, as a share of the estimated one; of a shape such as a lag, SI
-NEGLIGIBLE: Final[float] = 1e-6
 
 # Candidates and evidence
 
@@ -28,17 +26,8 @@ SIGNIFICANCE: Final[float] = 0.01
 IDENTIFIABLE_SHARE: Final[float] = 1e-4
 # score from which a sensor error must be smaller than what the sensor shows
 PLAUSIBILITY_SCORE: Final[float] = 10.0
-# fewest training runs of which a number may differ by run: the difference of two is one contrast, of which any effect
-# that acts unlike in them explains as much
-FEWEST_RUNS: Final[int] = 3
-# spectral peaks of the missing force that become candidate wave frequencies, in each equation
-TONES: Final[int] = 4
-# independent frequencies on each side of a peak whose median is its background
-TONE_BACKGROUND: Final[int] = 8
 # score of a wave from which its frequency is refined
 TONE_SCORE: Final[float] = 25.0
-# nonparametric forces in each equation whose evidence is computed
-FORCES_PER_EQUATION: Final[int] = 3
 # ridge of the regression that picks these forces, in samples at each knot
 FORCE_RIDGE: Final[float] = 0.5
 # disturbances under which a nonparametric force is sought, of those estimated without and with the chosen effects
@@ -48,23 +37,16 @@ LENGTH_SCALES: Final[tuple[float, ...]] = (1 / 3, 1 / 10, 1 / 30)
 
 # Structure search
 
-# most effects that one selection takes
+# most effects that one selection takes, with room for two columns each, and waves that are candidates in an equation
 MOST_EFFECTS: Final[int] = 4
-# most effects that a search on innovations takes
-MOST_EFFECTS_ONE_STEP: Final[int] = 16
-# most sensitivity columns of the effects that one selection takes, for which the disturbance's program has room
-MOST_COLUMNS: Final[int] = 8
-# rejected sets of effects after which others are tried once more
-MOST_REJECTIONS: Final[int] = 2
-# disturbances estimated for the leading candidates of one step
-DISTURBANCE_ESTIMATES: Final[int] = 3
-# rivals of an effect that are fitted in its place
-RIVALS_FITTED: Final[int] = 2
+# alternatives to the best that are tried: rivals fitted in its place, forces whose evidence is computed beside the one
+# that predicts most, disturbances estimated for those that lead next, narrower priors, and rounds after the first
+ALTERNATIVES: Final[int] = 2
 # log Bayes factor from which one explanation is clearly better than another
 CLEAR_LOG_BAYES: Final[float] = 3.0
 # log Bayes factor by which the leading candidate may be worse than none and its own disturbance is still estimated
 ESTIMATED_LOG_BAYES: Final[float] = 5.0
-# the larger share of a variance or score: above it something explains, or keeps, most
+# the larger share of a variance, an error or a score: above it something explains, or keeps, most
 MAJORITY: Final[float] = 0.5
 # relative error of a score by linearisation, over the root of the share that the free parameters leave
 SCORE_ERROR: Final[float] = 0.03
@@ -74,8 +56,6 @@ MOST_SCORE_ERROR: Final[float] = 0.3
 MINOR_SHARE: Final[float] = 0.02
 # share of the squared simulation error above which a candidate is preferred to one of a minor share
 MAJOR_SHARE: Final[float] = 0.2
-# ratio of squared simulation errors, explained or left, within which a candidate may replace one that simulation chose
-SIMULATION_RATIO: Final[float] = 2.0
 # squared simulation error that a chosen effect may leave, in units of what the best nonparametric force leaves
 FORCE_RATIO: Final[float] = 4.0
 # share of a gain in log evidence that is nearly all of it: of a set's, from which its best effect is first fitted by
@@ -90,24 +70,16 @@ LEVEL: Final[float] = 0.05
 BLOCKS: Final[int] = 4
 # blocks of each run that the others predict, one step ahead: innovations are correlated for less long
 BLOCKS_ONE_STEP: Final[int] = 24
-# most parts into which a run of an unstable model is cut for simulation
-MOST_RESTARTS: Final[int] = 64
-# fewest samples of such a part
+# fewest samples of the parts into which a run of an unstable model is cut for simulation
 FEWEST_SAMPLES: Final[int] = 8
 # share of a channel's variance that simulation of these parts may leave
 RESTART_ERROR: Final[float] = 0.1
 # sets of surrogate terms that are fitted in one round
 SURROGATE_FITS: Final[int] = 5
-# rounds in which surrogate terms are added
-SURROGATE_ROUNDS: Final[int] = 3
 # share of the squared simulation error that surrogate terms must remove
 SURROGATE_GAIN: Final[float] = 0.01
 # share of the squares that a surrogate term must explain, and that an equation in which a number acts must hold
 PLACE_SHARE: Final[float] = 0.05
-# growth of a named effect's standard error beside surrogate terms from which it keeps its value
-SURROGATE_INFLATION: Final[float] = 2.0
-# prior standard deviations of a nonparametric force that are tried, of the one with the highest evidence
-FORCE_SPREADS: Final[tuple[float, ...]] = (1.0, 0.5, 0.25)
 
 # Verdict
 

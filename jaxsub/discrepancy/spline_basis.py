@@ -45,7 +45,7 @@ def promising_forces(view: View, forces: Sequence[SmoothForce], missing: np.ndar
     for equation in equations:
         own = [force for force in forces if force.equation == equation]
         ranked = sorted(own, key=lambda force: -predicted[force.variable][force.equation])
-        chosen += ranked[: settings.FORCES_PER_EQUATION]
+        chosen += ranked[: 1 + settings.ALTERNATIVES]
     return chosen
 
 

@@ -30,7 +30,7 @@ def stepwise_by_innovations(
     search = _Search(ahead, ahead.begin(base), vocabulary)
     best, named = search.start, list[Named]()
     judged, fallen, refusals = NOTHING, set[str](), 0
-    while len(best.added) < settings.MOST_EFFECTS_ONE_STEP and refusals <= settings.MOST_REJECTIONS:
+    while refusals <= settings.ALTERNATIVES:
         selector = search.listed(best)
         selector.usable[[effect.label in fallen for effect in selector.candidates]] = False
         found = weighed(best.view, selector, fitter.progress)
@@ -139,7 +139,7 @@ class _Search:
         others: dict[str, AbstractEffect] = {}
         for i in (i for i in np.argsort(-scan.value) if close[i]):
             others.setdefault(scan.effects[i].label, scan.effects[i])
-        return named_on(selector, [], number), [*others.values()][: settings.RIVALS_FITTED]
+        return named_on(selector, [], number), [*others.values()][: settings.ALTERNATIVES]
 
 
 def backward_eliminated(

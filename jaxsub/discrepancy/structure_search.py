@@ -95,7 +95,7 @@ def answers(
             if ahead is not None:
                 return ahead[0], both(judged, ahead[1]), None
             told_ahead = True
-            if said.verdict == "unknown" and refusals < settings.MOST_REJECTIONS:
+            if said.verdict == "unknown" and refusals < settings.ALTERNATIVES:
                 refusals, after = refusals + 1, weighed(found.view, found.selector, fitter.progress)
         if after is None and not said.named:
             return best, judged, found

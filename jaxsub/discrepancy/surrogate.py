@@ -49,7 +49,7 @@ def _described(
     vocabulary: tuple[type[AbstractEffect], ...] | None,
 ) -> tuple[Model, Judged]:
     model, selector, fallen = named, found.selector, set[str]()
-    for _ in range(settings.SURROGATE_ROUNDS if found.unexplained else 0):
+    for _ in range(1 + settings.ALTERNATIVES if found.unexplained else 0):
         more = _with_more(fitter, named, model, selector, fallen)
         if more is None:
             break
@@ -102,14 +102,14 @@ def _worth(model: Model, more: Model) -> bool:
 def _fitted(
     fitter: ModelFitter, named: Model, model: Model, effects: Sequence[AbstractEffect], disturbance: Disturbance
 ) -> Model:
-    """The model with surrogate terms; named effects whose standard errors would grow too much keep their values."""
+    """The model with surrogate terms; named effects that would lose most of their precision keep their values."""
     more = fitter.with_effects(model, effects, disturbance)
     own = [row.name for effect in named.added for row in parameter_table(effect).values()]
     free = [name for name in own if name in more.fit.names]
     if not free or not is_admissible(more.fit, effects) or not float(more.fit.cost) < float(model.fit.cost):
         return more
     before, after = (with_coloured_errors(one.view, one.fit).standard_errors for one in (named, more))
-    if all(after[name] < settings.SURROGATE_INFLATION * before[name] for name in free):
+    if all(settings.MAJORITY * after[name] < before[name] for name in free):
         return more
     return fitter.with_effects(_holding(model, named, own), effects, disturbance)
 
@@ -146,15 +146,15 @@ def _with_force(
 ) -> tuple[Model, Judged]:
     """The model with the nonparametric force, if it is accepted.
 
-    Its prior standard deviation was estimated with many knots and may be too wide for its few: so half of it is tried,
-    and less as long as the simulation error falls.
+    Its prior standard deviation was estimated with many knots and may be too wide for its few: so it is halved as long
+    as the simulation error falls.
     """
     if found.pattern is None or not found.pattern.joins:
         return base, judged
     force, disturbance = found.pattern.force, found.naming.products.disturbance
     last = np.inf
-    for share in settings.FORCE_SPREADS:
-        less = dataclasses.replace(force, spread=share * force.spread)
+    for halvings in range(1 + settings.ALTERNATIVES):
+        less = dataclasses.replace(force, spread=0.5**halvings * force.spread)
         more = _fitted(fitter, named, base, [less], disturbance)
         gain = compare(base.predicted, more.predicted, more.admissible)
         if gain.accepted and more.view.finite:

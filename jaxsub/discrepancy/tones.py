@@ -33,11 +33,13 @@ def tones(
     omega = 2.0 * np.pi * fft.rfftfreq(size, interval)
     inside = (omega >= band[0]) & (omega <= band[1])
     power = np.abs(whole) ** 2
-    around = ndimage.median_filter(power, (2 * _LINES * settings.TONE_BACKGROUND + 1, 1), mode="nearest")
+    # so wide that the lines of all peaks are fewer than half of it
+    width = 2 * _LINES * 2 * settings.MOST_EFFECTS + 1
+    around = ndimage.median_filter(power, (width, 1), mode="nearest")
     height = (power / np.maximum(around, 1e-300))[inside]
     found = []
     for column in height.T:
         peaks, _ = signal.find_peaks(column, distance=_LINES + 2)
-        best = peaks[np.argsort(-column[peaks])[: settings.TONES]]
+        best = peaks[np.argsort(-column[peaks])[: settings.MOST_EFFECTS]]
         found.append(tuple(float(w) for w in omega[inside][best]))
     return found, int(np.sum(inside)) // _LINES

@@ -245,7 +245,7 @@ def facts(view: View) -> Facts:
         fixed_gains=view.vehicle.fixed_gains,
         density=view.vehicle.density,
         speed=view.vehicle.speed,
-        varying=_varying(view) if len(runs.times) >= settings.FEWEST_RUNS else (),
+        varying=_varying(view),
     )
 
 
@@ -261,8 +261,11 @@ def _varying(view: View) -> tuple[tuple[str, str, tuple[str, ...]], ...]:
     """The free numbers that may differ by run and do not yet, with their units and the places that they act on.
 
     Those are the equations with more than `PLACE_SHARE` of the squared forces over their inertia, or the sensors where
-    there is no force.
+    there is no force. None may differ between two runs: what differs is one contrast, and any effect that acts unlike
+    in the two explains as much.
     """
+    if len(view.runs.times) < 3:
+        return ()
     layout, mass = view.vehicle.layout, np.asarray(view.vehicle.mass_matrix())
     shown, forcing = (np.asarray(part)[..., 1:] for part in (view.base.shown, view.base.forcing))
     n, may = len(mass), numbers_that_may_vary(view.vehicle)

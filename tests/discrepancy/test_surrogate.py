@@ -44,7 +44,7 @@ class Freely(Selector):
         self.owners = [[i] for i in range(len(candidates))]
         self.free = FreeRun(shares)
         best = lambda columns: (0.0, SimpleNamespace(disturbance=disturbance))
-        self.evidence = SimpleNamespace(best=best, products=[])
+        self.evidence = SimpleNamespace(best=best, given=[])
         self.predicted = lambda chosen, index, under: (candidates[index], True)
 
 
