@@ -1,7 +1,8 @@
 """The bodies in which physics is concealed, and how they are driven: zigzags, circles, pulses, depth, speed.
 
 NPS AUV II in six degrees of freedom, its constant thrust replaced by a propeller whose speed is recorded, so that the
-speed changes; DSRV in the vertical plane; a rig of one coordinate.
+speed changes, and if asked for with nonlinear damping and the rigid body's Coriolis forces; DSRV in the vertical plane;
+a rig of one coordinate.
 """
 
 import math
@@ -21,10 +22,16 @@ _ENVIRONMENT = {"nps-temperature": {"temperature": "T"}, "nps-altitude": {"altit
 _DEPTH = {"nps-altitude": 32.0, "nps-shallow": 5.0, "dsrv": 60.0}
 # rad, which no run's command of the rudder exceeds
 LARGEST_RUDDER = 0.32
-_DIVE = {"nps-altitude": 0.5, "nps-shallow": 0.35}
+# of the dive commands of deep water, where water is shallow
+DIVE = {"nps-altitude": 0.5, "nps-shallow": 0.35}
 
 
-def body(name: str, channels: tuple[str, ...] = ()) -> AbstractVehicle:
+# SI; in a turn each is a fifth to a half of the linear term of its equation. X_vr and X_wq are what added mass makes.
+_NONLINEAR = {"X_u|u|": -28.0, "Y_v|v|": -4200.0, "Z_w|w|": -7000.0, "M_q|q|": -1.0e5, "N_r|r|": -4.2e4,
+              "X_vr": 4094.0, "X_wq": -17865.0}  # fmt: skip
+
+
+def body(name: str, channels: tuple[str, ...] = (), nonlinear: bool = False) -> AbstractVehicle:
     """The true vehicle, with all of its channels or those given."""
     if name == "rig":
         return vehicle_from(_RIG, "rig")
@@ -38,6 +45,9 @@ def body(name: str, channels: tuple[str, ...] = ()) -> AbstractVehicle:
         data["coefficients"]["X_nn"] = {"value": push / CRUISE_SHAFT**2}
         data["inputs"]["shaft_speed"] = "n"
         data["environment"] = _ENVIRONMENT.get(name, {})
+    if nonlinear:
+        data["coefficients"] |= _NONLINEAR
+        data["model"] = {"coriolis": "rigid-body"}
     if channels:
         data["outputs"] = {c: data["outputs"][c] for c in channels}
     return vehicle_from(data, name)
@@ -77,7 +87,7 @@ def commands(name: str, run: int, samples: int, rng: np.random.Generator) -> np.
         return (0.05 * square(t, draw(18.0, 30.0), 1.0) + prbs(samples, 15 + 5 * run, 0.03, seed()))[:, None]
     rudder = _rudder(t, run, draw, seed)
     dive = 0.06 * square(t, draw(24.0, 44.0), 1.0) + _pulses(t, draw, 0.10) + prbs(samples, 20, 0.05, seed())
-    dive *= _DIVE.get(name, 1.0)
+    dive *= DIVE.get(name, 1.0)
     # right and left apart now and then: only the difference shakes roll
     apart = prbs(samples, 12 + 4 * run, 0.2, seed()) + doublet(t, draw(0.05, 0.4) * t[-1], 3.0, 0.1)
     shaft = CRUISE_SHAFT * (1.0 + 0.25 * prbs(samples, 110 + 20 * run, 1.0, seed()) * draw(0.7, 1.0))

@@ -63,6 +63,8 @@ def _table(results: dict, axis) -> None:
             low, top = score["interval"]
             axis.plot([low, top], [y, y], color="0.2", lw=1.2)
     for i, row in enumerate(answerers["jaxsub"]):
+        if row["target"] is None:
+            continue
         axis.plot([row["target"]] * 2, [i - 0.45, i + 0.45], color="k", lw=2, label="target" if i == 0 else None)
     labels = [f"{row['condition']}\n(n = {row['n']})" for row in answerers["jaxsub"]]
     axis.set_yticks(range(len(labels)), labels, fontsize=8)

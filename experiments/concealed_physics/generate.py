@@ -1,7 +1,7 @@
 """Files that conceal a case's physics, and, apart from them, what is true."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -10,11 +10,12 @@ import numpy as np
 from jaxsub.recording import Recording, save
 from jaxsub.vehicle import AbstractVehicle, write_vehicle
 
-from .bodies import INTERVAL, NO_VELOCITY, body, commands, start_state
+from .autopilot import references
+from .bodies import DIVE, INTERVAL, NO_VELOCITY, body, commands, start_state
 from .hydrostatics import temperature
 from .logs import LOGGED, white
 from .plan import Case
-from .simulate import Drive, outputs
+from .simulate import Drive, outputs, steered
 from .sizing import Unabsorbed
 from .surroundings import BOTTOM
 from .truth import Truth
@@ -31,18 +32,12 @@ def generate(case: Case, folder: Path) -> dict:
     The last run is the one to hold out. Where an effect cannot be of any size in its row, `reached` is 0 and nothing is
     written.
     """
-    rng = np.random.default_rng([case.seed, 7])
-    vehicle = body(case.body, () if case.velocity else NO_VELOCITY)
+    way, rng = case.way, np.random.default_rng([case.seed, 7])
+    vehicle = body(case.body, () if way.velocity else NO_VELOCITY, way.nonlinear)
     layout = vehicle.layout
-    samples = round(case.seconds / INTERVAL)
-    starts = np.stack([start_state(case.body, vehicle, rng) for _ in range(RUNS)])
-    held = np.stack([commands(case.body, run, samples, rng) for run in range(RUNS)])
-    calm = np.zeros((RUNS, samples, len(layout.equations)))
-    drive = Drive(*(jnp.asarray(a) for a in (starts, held[:, :-1], calm)))
     sigma = np.array([output.sigma for output in layout.outputs])
     truths = tuple(TRUTHS[key] for key in case.concealed)
-    train = Drive(*(a[:-1] for a in drive))
-    amplitudes, reached = _sized(case, truths, Unabsorbed(vehicle, train, sigma)) if truths else ([], [])
+    held, drive, amplitudes, reached = _driven(case, vehicle, truths, sigma, rng)
     truth = {
         "names": [t.name for t in truths],
         "where": [list(t.where) for t in truths],
@@ -54,27 +49,62 @@ def generate(case: Case, folder: Path) -> dict:
     }
     if not all(reached):
         return truth
-    sizes = jnp.asarray(amplitudes) if amplitudes else jnp.zeros(0)
-    ideal, states = (np.asarray(a) for a in outputs(vehicle, truths, sizes, drive))
+    ideal, states = (np.asarray(a) for a in outputs(vehicle, truths, jnp.asarray(amplitudes), drive))
     shown = ideal
-    if case.noise == "coloured":
+    if way.noise == "coloured":
         pushed = drive._replace(push=jnp.asarray(_disturbance(vehicle, drive, sigma, rng)))
-        shown, states = (np.asarray(a) for a in outputs(vehicle, truths, sizes, pushed))
+        shown, states = (np.asarray(a) for a in outputs(vehicle, truths, jnp.asarray(amplitudes), pushed))
     if not np.all(np.isfinite(shown)):
         return truth | {"reached": [0.0] * len(reached)}
-    measured = LOGGED.get(case.condition, white)(shown, sigma, rng)
-    stated = sigma * STATED.get(case.noise, 1.0)
-    errors = np.sqrt(np.nanmean(((measured - ideal)[-1] / stated) ** 2, axis=0))
+    measured = LOGGED.get(way.logs, white)(shown, sigma, _noise(case) if way.autopilot else rng)
+    errors = np.sqrt(np.nanmean((measured - ideal)[-1] ** 2, axis=0))
     truth["floor"] = dict(zip(layout.channels, errors.tolist(), strict=True))
-    sigmas = [None] * len(sigma) if case.condition == "estimated" else stated.tolist()
+    stated = sigma * STATED.get(way.noise, 1.0)
+    sigmas = [None] * len(sigma) if way.noise == "estimated" else stated.tolist()
     write(folder, nearly(vehicle, sigmas, rng), measured, held, states)
     return truth
 
 
-def _sized(case: Case, truths: Sequence[Truth], seen: Unabsorbed) -> tuple[list[float], list[float]]:
-    """The size `a` of each effect on its own, and the sigmas that it leaves."""
-    found = [seen.largest(truth, case.sizes) for truth in truths]
-    return [a for a, _ in found], [size for _, size in found]
+def _driven(
+    case: Case, vehicle: AbstractVehicle, truths: tuple[Truth, ...], sigma: np.ndarray, rng: np.random.Generator
+) -> tuple[np.ndarray, Drive, list[float], list[float]]:
+    """Commands (R, K, m), what acts on the runs, the size `a` of each effect on its own, and the sigmas that it leaves.
+
+    An autopilot's commands follow from the effects too, whose sizes are found anew under these.
+    """
+    samples = round(case.way.seconds / INTERVAL)
+    starts = np.stack([start_state(case.body, vehicle, rng) for _ in range(RUNS)])
+    if case.way.autopilot:
+        steer = _autopilot(case, vehicle, starts, sigma, rng)
+    else:
+        fixed = np.stack([commands(case.body, run, samples, rng) for run in range(RUNS)])
+        steer = lambda truths, sizes: fixed
+    calm = np.zeros((RUNS, samples, len(vehicle.layout.equations)))
+    drive = lambda held: Drive(*(jnp.asarray(a) for a in (starts, held[:, :-1], calm)))
+    held, found = steer((), []), []
+    for _ in range(1 + case.way.autopilot if truths else 0):
+        seen = Unabsorbed(vehicle, Drive(*(a[:-1] for a in drive(held))), sigma)
+        found = [seen.largest(truth, case.sizes) for truth in truths]
+        held = steer(truths, [a for a, _ in found])
+    return held, drive(held), [a for a, _ in found], [size for _, size in found]
+
+
+def _autopilot(
+    case: Case, vehicle: AbstractVehicle, starts: np.ndarray, sigma: np.ndarray, rng: np.random.Generator
+) -> Callable[[tuple[Truth, ...], list[float]], np.ndarray]:
+    """The commands of an autopilot that sees the measurements with their noise, by what is concealed and its sizes."""
+    samples = round(case.way.seconds / INTERVAL)
+    named = [dict(zip(vehicle.layout.states, start, strict=True)) for start in starts]
+    wanted = np.stack([references(start, DIVE.get(case.body, 1.0), samples, rng) for start in named])
+    errors = white(np.zeros((RUNS, samples, len(sigma))), sigma, _noise(case))
+    return lambda truths, sizes: np.asarray(
+        steered(vehicle, truths, jnp.asarray(sizes), *map(jnp.asarray, (starts, wanted, errors)))
+    )
+
+
+def _noise(case: Case) -> np.random.Generator:
+    """That of the sensors that an autopilot sees, and a recording holds."""
+    return np.random.default_rng([case.seed, 8])
 
 
 def _disturbance(vehicle: AbstractVehicle, drive: Drive, sigma: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -1,22 +1,27 @@
 """The judge: what `jaxsub diagnose` calls, on the files alone."""
 
-import json
 import time
 from pathlib import Path
 
-from jaxsub.cli import diagnose
+from jaxsub.cli.diagnose import answered
+from jaxsub.cli.runs import load_train_and_test
+from jaxsub.recording import hold_out
+from jaxsub.vehicle import read_vehicle
 
 
 def judge(folder: Path) -> dict:
     """What `jaxsub diagnose` says of the files in `folder`, the scored part; `error` where it says nothing."""
     runs = sorted(folder.glob("run*.csv"))
-    begin = time.perf_counter()
+    begin, spent = time.perf_counter(), time.process_time()
     try:
-        diagnose.run(folder / "vehicle.toml", runs, (), folder / "out", False, manoeuvre=False)
+        vehicle = read_vehicle(folder / "vehicle.toml")
+        train, test = hold_out(load_train_and_test(runs, (), vehicle)[0])
+        answer = answered(vehicle, train, test, manoeuvre=False)
+        answer.write(folder / "out")
     except Exception as failed:  # whatever stops it is an answer too
         return {"error": f"{type(failed).__name__}: {failed}"[-600:]}
-    seconds = time.perf_counter() - begin
-    found = json.loads((folder / "out" / "diagnosis.json").read_text(encoding="utf-8"))
+    seconds, cpu_seconds = time.perf_counter() - begin, time.process_time() - spent
+    found, history = answer.conclusions.to_json(), answer.conclusions.history
     physics = [
         {
             "effect": entry["effect"],
@@ -33,6 +38,8 @@ def judge(folder: Path) -> dict:
         "coefficients_p_value": found["mismatch"]["coefficients_p_value"],
         "where": [place["equation"] for place in found["mismatch"]["where"]],
         "held_out": found["fit"]["held_out"],
+        "held_out_rms": {"baseline": history[0][1], "improved": history[-1][1]} if history else {},
         "p_value": found["mismatch"]["p_value"],
         "seconds": seconds,
+        "cpu_seconds": cpu_seconds,
     }

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from jaxsub.estimate import Rate
 
 MOST_RIVALS = 4
+# effects at once up to which each has to be named, and of more the share of the mismatch that has to be explained
+FEW, MOST = 3, 0.75
 # what kind of thing is wrong where an effect of a family is missing; of any other family, the vehicle's structure
 KINDS = {"actuators": "actuator", "sensors": "sensor", "environment": "environment"}
 EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0)
@@ -44,6 +46,49 @@ def right(names: Sequence[str], answer: dict) -> bool:
     # forms of one effect count once
     distinct = {tuple(sorted(s)) for s in sets}
     return len(distinct) == len(set(names)) and _matched(list(dict.fromkeys(names)), list(distinct))
+
+
+def right_of_many(names: Sequence[str], answer: dict, floor: dict) -> bool:
+    """Whether every accepted effect of `answer` is among the many `names`, and most of the mismatch is explained.
+
+    Where effects are ten, not each has to be named. One at least is, none is false, and the improved model removes
+    `MOST` of the test run's squared error above the noise `floor` of each channel. A peer simulates no improved model,
+    and is judged by its names alone.
+    """
+    if answer.get("verdict") not in ("named", "ambiguous"):
+        return False
+    sets = list({tuple(sorted(offered(entry, answer["verdict"]))) for entry in answer["physics"]})
+    true = [s for s in sets if len(s) <= MOST_RIVALS and set(s) & set(names)]
+    share = explained(answer, floor)
+    return 0 < len(true) == len(sets) and (share is None or share >= MOST)
+
+
+def counted(names: Sequence[str], answer: dict) -> dict:
+    """How many of `names` the answer puts forward, and how many of its entries put forward none of them."""
+    sets = [offered(entry, answer["verdict"]) for entry in answer.get("physics", [])]
+    seen = {name for offers in sets for name in offers}
+    return {"true": len(set(names) & seen), "of": len(set(names)), "false": sum(not set(s) & set(names) for s in sets)}
+
+
+def how_wrong(names: Sequence[str], answer: dict) -> str:
+    """What kind of wrong a wrong answer is."""
+    if "error" in answer:
+        return "an error"
+    if not answer.get("physics"):
+        return f"`{answer['verdict']}`"
+    found = counted(names, answer)
+    if found["false"]:
+        return "a false name" if found["true"] < found["of"] else "a false name beside the true ones"
+    return "some of several named" if found["true"] < found["of"] else "as more entries, or too little explained"
+
+
+def explained(answer: dict, floor: dict) -> float | None:
+    """The share of the test run's squared error above the noise that the improved model removes."""
+    errors = held_out(answer, floor)
+    if errors is None:
+        return None
+    before, after = errors["before"] ** 2, errors["after"] ** 2
+    return (before - after) / max(before - 1.0, 1e-12)
 
 
 def false_alarm(answer: dict) -> bool:
@@ -122,9 +167,12 @@ def covered(numbers: Sequence[dict], names: Sequence[str], answer: dict) -> list
 
 
 def held_out(answer: dict, floor: dict) -> dict | None:
-    """rms over channels of rms/σ on the test run: before, after, and with the true model."""
-    if "held_out" not in answer or not floor:
+    """Errors on the test run before and after, in units of those of the true model: rms over channels of rms/`floor`.
+
+    So noise whose sigma is stated wrongly, or estimated from what a model leaves, counts as any other.
+    """
+    errors = answer.get("held_out_rms")
+    if not errors or not floor:
         return None
-    overall = lambda by: math.sqrt(sum(by[c] ** 2 for c in floor) / len(floor))
-    before, after = answer["held_out"]["baseline"], answer["held_out"]["improved"]
-    return {"before": overall(before), "after": overall(after), "floor": overall(floor)}
+    overall = lambda by: math.sqrt(sum((by[c] / floor[c]) ** 2 for c in floor) / len(floor))
+    return {"before": overall(errors["baseline"]), "after": overall(errors["improved"])}

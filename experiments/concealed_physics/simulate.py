@@ -11,6 +11,7 @@ from jax import Array
 
 from jaxsub.vehicle import AbstractVehicle
 
+from .autopilot import command
 from .bodies import INTERVAL
 from .truth import Moment, Truth
 
@@ -31,14 +32,74 @@ def states(
 ) -> Array:
     """States at the samples, (R, K, s), of `vehicle` with `truths` of `sizes`."""
     h = INTERVAL / steps
+    sample = _sample(vehicle, truths, sizes, h)
+
+    def run(start: Array, commands: Array, push: Array) -> Array:
+        held = jnp.repeat(commands, steps, axis=0)
+        held = _deflections(vehicle, truths, sizes, held, h)
+        part = jnp.arange(len(held) + 1) / steps
+        fine = jax.vmap(lambda p: jnp.interp(part, jnp.arange(len(push)), p), 1, 1)(push)
+        grouped = (h * jnp.arange(len(held)), held, fine[:-1], fine[1:])
+        grouped = jax.tree.map(lambda x: x.reshape(-1, steps, *x.shape[1:]), grouped)
+        begin = _begin(truths, start)
+
+        def one(state: Array, inputs: tuple) -> tuple[Array, Array]:
+            after = sample(state, inputs)
+            return after, after
+
+        after = jax.lax.scan(one, begin, grouped)[1]
+        return jnp.concatenate([begin[None], after])[:, : len(start)]
+
+    return jax.vmap(run)(*drive)
+
+
+@eqx.filter_jit
+def steered(
+    vehicle: AbstractVehicle, truths: tuple[Truth, ...], sizes: Array, start: Array, wanted: Array, errors: Array
+) -> Array:
+    """Commands of the autopilot (R, K, m) that keeps `wanted` (R, K, 4) by sensors with `errors` (R, K, c).
+
+    Those of a sample follow from what the sensors show at it. Actuators and sensors need all samples before, so each
+    is worked out anew from those.
+    """
+    h = INTERVAL / STEPS
+    sample, calm = _sample(vehicle, truths, sizes, h), jnp.zeros((STEPS, len(vehicle.layout.equations)))
+
+    def run(start: Array, wanted: Array, errors: Array) -> Array:
+        begin, count = _begin(truths, start), len(wanted)
+
+        def one(k: Array, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+            now, moved, commands = carry
+            moved = moved.at[k].set(now[: len(start)])
+            shown = _shown(vehicle, truths, sizes, moved, commands[:-1])[k] + errors[k]
+            commands = commands.at[k].set(command(wanted[k], dict(zip(vehicle.layout.channels, shown, strict=True))))
+            held = _deflections(vehicle, truths, sizes, jnp.repeat(commands, STEPS, axis=0), h)
+            held = jax.lax.dynamic_slice_in_dim(held, k * STEPS, STEPS)
+            t = h * (k * STEPS + jnp.arange(STEPS))
+            return sample(now, (t, held, calm, calm)), moved, commands
+
+        moved = jnp.repeat(start[None], count, axis=0)
+        commands = jnp.zeros((count, len(vehicle.layout.inputs)))
+        return jax.lax.fori_loop(0, count, one, (begin, moved, commands))[2]
+
+    return jax.lax.map(lambda run_of: run(*run_of), (start, wanted, errors))
+
+
+def _begin(truths: tuple[Truth, ...], start: Array) -> Array:
+    """A state and the truths' own after it."""
+    return jnp.concatenate([start, jnp.zeros(sum(truth.memory for truth in truths))])
+
+
+def _sample(vehicle: AbstractVehicle, truths: tuple[Truth, ...], sizes: Array, h: float):
+    """The state a sample later, by steps of h s: their times, deflections, and pushes at their ends."""
     n = len(vehicle.layout.equations)
     inverse, damping = jnp.linalg.inv(vehicle.mass_matrix()), vehicle.damping_matrix()
     extra = len(vehicle.layout.environment)
     count = sum(truth.memory for truth in truths)
 
-    def rates(t: Array, state: Array, command: Array, push: Array) -> Array:
+    def rates(t: Array, state: Array, deflected: Array, push: Array) -> Array:
         own, memory = state[: state.shape[0] - count], state[state.shape[0] - count :]
-        motion = vehicle.motion(own, jnp.concatenate([command, jnp.zeros(extra), t[None]]))
+        motion = vehicle.motion(own, jnp.concatenate([deflected, jnp.zeros(extra), t[None]]))
         force = vehicle.force(motion) + damping @ own[:n] + push
         memory_rates, at = [], 0
         for truth, size in zip(truths, sizes, strict=True):
@@ -54,31 +115,15 @@ def states(
         return jnp.concatenate([inverse @ force, positions, *memory_rates])
 
     def step(state: Array, inputs: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
-        t, command, low, high = inputs
+        t, deflected, low, high = inputs
         middle = 0.5 * (low + high)
-        k1 = rates(t, state, command, low)
-        k2 = rates(t + h / 2, state + h / 2 * k1, command, middle)
-        k3 = rates(t + h / 2, state + h / 2 * k2, command, middle)
-        k4 = rates(t + h, state + h * k3, command, high)
+        k1 = rates(t, state, deflected, low)
+        k2 = rates(t + h / 2, state + h / 2 * k1, deflected, middle)
+        k3 = rates(t + h / 2, state + h / 2 * k2, deflected, middle)
+        k4 = rates(t + h, state + h * k3, deflected, high)
         return state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), None
 
-    def run(start: Array, commands: Array, push: Array) -> Array:
-        held = jnp.repeat(commands, steps, axis=0)
-        held = _deflections(vehicle, truths, sizes, held, h)
-        part = jnp.arange(len(held) + 1) / steps
-        fine = jax.vmap(lambda p: jnp.interp(part, jnp.arange(len(push)), p), 1, 1)(push)
-        grouped = (h * jnp.arange(len(held)), held, fine[:-1], fine[1:])
-        grouped = jax.tree.map(lambda x: x.reshape(-1, steps, *x.shape[1:]), grouped)
-
-        def sample(state: Array, inputs: tuple) -> tuple[Array, Array]:
-            after = jax.lax.scan(step, state, inputs)[0]
-            return after, after
-
-        begin = jnp.concatenate([start, jnp.zeros(count)])
-        after = jax.lax.scan(sample, begin, grouped)[1]
-        return jnp.concatenate([begin[None], after])[:, : len(start)]
-
-    return jax.vmap(run)(*drive)
+    return lambda state, inputs: jax.lax.scan(step, state, inputs)[0]
 
 
 def _deflections(vehicle: AbstractVehicle, truths: Sequence[Truth], sizes: Array, held: Array, h: float) -> Array:

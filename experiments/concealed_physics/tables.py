@@ -1,46 +1,82 @@
 """The tables of this experiment's page."""
 
+from collections import Counter
 from typing import Any
 
 from ..tables import table
+from .assemble import GROUPS, SEVERAL
+from .scoring import rate
+
+_PEERS = {"pysindy": "PySINDy", "stepwise_aic": "stepwise AIC", "stepwise_bic": "stepwise BIC"}
 
 
 def tables(results: dict[str, Any]) -> dict[str, str]:
-    """By condition the cases answered rightly, what else was measured, and every wrong answer, by set of cases."""
-    conditions = [row["condition"] for row in next(iter(results.values()))["conditions"]]
-    rows = [[name, *(_right(found, name) for found in results.values())] for name in conditions]
-    rows.append(["all", *(_rate(found["right"]) for found in results.values())])
-    return {
-        "today, by condition": table(["right answers", *results], rows),
-        "today, also measured": table(["also measured", *results], _also(results)),
-        "today, wrong": table(["case", "concealed", "size, σ", "answer"], _wrong(results)),
+    """Right answers by condition, beside them peers', what else was measured, and what was wrong, by set of cases."""
+    rows = {group: _rows(results, names) for group, names in GROUPS.items()}
+    rows[SEVERAL].append(["all cases, clean ones among them", *(_rate(one["right"]) for one in results.values())])
+    return {group: table([group, *results], of) for group, of in rows.items()} | {
+        "false alarms": table(["nothing concealed", *_twice(results)], _clean(results)),
+        "also measured": table(["also measured", *results], _also(results)),
+        "wrong": table(["wrong answers", "cases", "conditions"], _wrong(results)),
+        "peers": table(["right answers", *GROUPS], _peers(next(iter(results.values())))),
     }
 
 
-def _right(found: dict[str, Any], condition: str) -> str:
-    return _rate(next(row["right"] for row in found["conditions"] if row["condition"] == condition))
+def _rows(results: dict[str, Any], names: list[str]) -> list[list[str]]:
+    right = lambda one, name: _rate(next(row["right"] for row in one["conditions"] if row["condition"] == name))
+    return [[name, *(right(one, name) for one in results.values())] for name in names]
 
 
-def _rate(rate: dict[str, Any]) -> str:
+def _rate(of: dict[str, Any]) -> str:
     """Hits of trials, with the 95 % interval in percent."""
-    if not rate["n"]:
+    if not of["n"]:
         return "–"
-    low, high = (100.0 * end for end in rate["interval"])
-    return f"{round(rate['rate'] * rate['n'])} of {rate['n']} ({low:.0f}–{high:.0f} %)"
+    low, high = (100.0 * end for end in of["interval"])
+    return f"{round(of['rate'] * of['n'])} of {of['n']} ({low:.0f}–{high:.0f} %)"
+
+
+def _twice(results: dict[str, Any]) -> list[str]:
+    return [f"{name}: {what}" for name in results for what in ("verdict `none`", "false alarms")]
+
+
+def _clean(results: dict[str, Any]) -> list[list[str]]:
+    """By kind of clean cases and of all, how many verdicts are `none`, and how many name an effect."""
+    said = {
+        "none_white": "white noise", "none_coloured": "coloured disturbance", "none_half": "sigma stated as half",
+        "none_double": "sigma stated as double", "none_logs": "recorded as logs are",
+    }  # fmt: skip
+    rows = [
+        [label, *(_rate(one[what][kind]) for one in results.values() for what in ("clean", "false_alarm"))]
+        for kind, label in said.items()
+    ]
+    total = lambda one: next(row["right"] for row in one["conditions"] if row["condition"] == "nothing concealed")
+    return [*rows, ["all", *(_rate(part) for one in results.values() for part in (total(one), one["false_alarms"]))]]
 
 
 def _also(results: dict[str, Any]) -> list[list[str]]:
     columns = {
-        "false alarms": lambda found: _rate(found["false_alarms"]),
-        "first place right": lambda found: _rate(found["located"]["strict"]),
-        "parameters within their 95 % interval": lambda found: _rate(found["coverage"]),
-        "test error within 10 % of the floor": lambda found: _rate(found["held_out"]["within_10_percent"]),
-        "engines": lambda found: f"{len(found['engines'])}",
-        "cases that could not be made": lambda found: f"{len(found['not_made'])}",
-        "answers that ended in an error": lambda found: f"{len(found['failed'])}",
-        "median and longest time of a case, s": lambda found: _seconds(found["seconds"]),
+        "first place right": lambda one: _rate(one["located"]["strict"]),
+        "parameters within their 95 % interval": lambda one: _rate(one["coverage"]),
+        "names stated with 0.97 or more that are true": lambda one: _certain(one["calibration"]),
+        "test error within 10 % of the noise": lambda one: _rate(one["held_out"]["within_10_percent"]),
+        "of ten effects named; false names": lambda one: _many(one["many"]),
+        "cases that could not be made": lambda one: f"{len(one['not_made'])}",
+        "CPU seconds of a case: median, longest": lambda one: _seconds(one["cpu_seconds"]),
+        "engine": lambda one: ", ".join(one["engines"]),
     }
     return [[name, *map(say, results.values())] for name, say in columns.items()]
+
+
+def _certain(bins: list[dict[str, Any]]) -> str:
+    last = bins[-1] if bins and bins[-1]["stated"] >= 0.97 else None
+    return _rate(last) if last else "–"
+
+
+def _many(counts: list[dict[str, Any]]) -> str:
+    """Of each case how many of its many effects are named, and how many false names all have."""
+    if not counts:
+        return "–"
+    return f"{', '.join(str(one['true']) for one in counts)}; {sum(one['false'] for one in counts)}"
 
 
 def _seconds(seconds: dict[str, float]) -> str:
@@ -48,17 +84,22 @@ def _seconds(seconds: dict[str, float]) -> str:
 
 
 def _wrong(results: dict[str, Any]) -> list[list[str]]:
-    """Every case that was answered wrongly, of either set."""
-    cases = [case for found in results.values() for case in found["cases"] if not case["right"]]
-    return [
-        [c["case"], ", ".join(c["concealed"]) or "nothing", f"{c['size']:g}", _answer(c["verdict"], c["names"])]
-        for c in cases
-    ]
+    """Wrong answers of all sets by what is wrong, and the conditions in which they are, with their numbers."""
+    kinds: dict[str, Counter[str]] = {}
+    for case in (case for found in results.values() for case in found["cases"] if not case["right"]):
+        kinds.setdefault(case["wrong"], Counter())[case["case"].rsplit("-", 1)[0]] += 1
+    rows = sorted(kinds.items(), key=lambda item: -item[1].total())
+    return [[kind, f"{of.total()}", ", ".join(f"{c} {n}" for c, n in of.most_common())] for kind, of in rows]
 
 
-def _answer(verdict: str | None, names: list[list[str]]) -> str:
-    """Verdict and names; those of rivals stand behind a stroke."""
-    if verdict is None:
-        return "none: it ended in an error"
-    said = ", ".join(" / ".join(each) for each in names)
-    return f"{verdict}: {said}" if said else verdict
+def _peers(found: dict[str, Any]) -> list[list[str]]:
+    """The share right in each group of conditions, of the engine and of others on the same files."""
+    peers = {name: found["peers"][key] for key, name in _PEERS.items()}
+    answers = {name: one["conditions"] for name, one in ({"jaxsub": found} | peers).items()}
+    return [[name, *(_rate(_pooled(rows, names)) for names in GROUPS.values())] for name, rows in answers.items()]
+
+
+def _pooled(rows: list[dict[str, Any]], names: list[str]) -> dict[str, Any]:
+    of = [row["right"] for row in rows if row["condition"] in names]
+    hits, trials = sum(round((one["rate"] or 0.0) * one["n"]) for one in of), sum(one["n"] for one in of)
+    return rate(k < hits for k in range(trials))

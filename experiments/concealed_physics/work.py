@@ -5,18 +5,18 @@ import traceback
 from functools import partial
 from pathlib import Path
 
-from jaxsub.fingerprint import sources
-
 from ..cases import with_files
+from .engine import Engine, require
 from .generate import generate
 from .judge import judge
 from .peers import peers
 from .plan import Case
 
 
-def work(case: Case) -> dict:
-    """The line of `case`; it has no `answer` where its files could not be made."""
-    line = dataclasses.asdict(case) | {"case": case.name, "fresh": case.fresh, "engine": sources()[:12]}
+def work(case: Case, engine: Engine) -> dict:
+    """The line of `case`, answered by `engine`; it has no `answer` where its files could not be made."""
+    require(engine)
+    line = dataclasses.asdict(case) | {"case": case.name, "fresh": case.fresh, "engine": engine._asdict()}
     return with_files(line, partial(generate, case), partial(_answered, case))
 
 

@@ -1,15 +1,18 @@
 """The experiment on concealed physics makes the files it says, of the size it says, and scores answers as it says."""
 
+import json
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.stats import binomtest
 
-from experiments.concealed_physics import bodies, plan, scoring, truths
+from experiments.concealed_physics import __main__ as battery
+from experiments.concealed_physics import autopilot, bodies, engine, plan, scoring, truths
 from experiments.concealed_physics.actuators import ACTUATORS
 from experiments.concealed_physics.generate import generate
-from experiments.concealed_physics.simulate import Drive, states
+from experiments.concealed_physics.simulate import Drive, outputs, states, steered
 from experiments.concealed_physics.sizing import Unabsorbed
 from jaxsub.recording import load
 from jaxsub.vehicle import read_vehicle
@@ -55,6 +58,7 @@ def test_a_concealed_stop_is_the_same_in_every_run():
     """Claim: runs of different largest commands stop at the one limit that the truth states."""
     stop = next(t for t in ACTUATORS if t.name == "actuator-saturation")
     drawn = [bodies.commands("nps", run, 800, np.random.default_rng(run))[:, 0] for run in range(4)]
+    assert stop.command is not None
     largest = [np.abs(held).max() for held in drawn]
     assert max(largest) - min(largest) > 0.01
     assert max(largest) <= bodies.LARGEST_RUDDER
@@ -78,13 +82,13 @@ def test_size_counts_only_what_no_coefficient_can_absorb():
 
 
 def test_files_hold_noise_of_the_true_sigma_and_state_the_misstated_one(tmp_path):
-    case = plan.Case("sigma", 0, (KEY,), 5.0, noise="double", seconds=20.0)
+    case = plan.Case("sigma", 0, (KEY,), 5.0, plan.Way("double", seconds=20.0))
     truth = generate(case, tmp_path / "files")
     vehicle = read_vehicle(tmp_path / "files" / "vehicle.toml")
     stated = {output.channel: output.sigma for output in vehicle.layout.outputs}
     assert stated == {"x": 0.01, "x_rate": 0.02}
     # 100 samples: rms of white noise within 25 % at more than three standard errors
-    assert all(abs(rms - 0.5) < 0.125 for rms in truth["floor"].values())
+    assert all(abs(rms / stated[channel] - 0.5) < 0.125 for channel, rms in truth["floor"].items())
     off = {n: float(v) / float(bodies.body("rig").values()[n]) - 1.0 for n, v in vehicle.values().items()}
     assert all(0.1 <= abs(share) <= 0.2 for name, share in off.items() if name != "I_x")
     assert len(list((tmp_path / "files").glob("run*.csv"))) == 4
@@ -95,12 +99,75 @@ def test_files_hold_noise_of_the_true_sigma_and_state_the_misstated_one(tmp_path
     np.testing.assert_array_equal(first, second)
 
 
-def test_a_short_plan_covers_every_condition_and_a_round_every_effect():
-    listed = plan.ordered({c: n for c, (n, _) in plan.COUNTS.items()})
-    assert len({case.name for case in listed}) == len(listed) == sum(n for n, _ in plan.COUNTS.values())
+def test_files_leave_sigma_to_the_judge_and_the_truth_keeps_it(tmp_path):
+    """Claim: where sigma is to be estimated no channel's is in the file, and the truth has the noise in SI."""
+    case = plan.Case("estimated", 0, (KEY,), 5.0, plan.Way("estimated", seconds=20.0))
+    truth = generate(case, tmp_path / "files")
+    assert [output.sigma for output in read_vehicle(tmp_path / "files" / "vehicle.toml").layout.outputs] == [None] * 2
+    assert truth["floor"] == {"x": pytest.approx(0.005, rel=0.25), "x_rate": pytest.approx(0.01, rel=0.25)}
+
+
+def test_an_autopilot_commands_what_its_law_makes_of_what_sensors_then_show():
+    """Claim: driven by an autopilot's commands, sensors show what its law turns into them, and it gets where it should.
+
+    A lag of the rudder and a delay of the compass reach back over the samples.
+    """
+    vehicle = bodies.body("nps")
+    channels, rng = vehicle.layout.channels, np.random.default_rng(5)
+    concealed = tuple(truths.TRUTHS[key] for key in ("nps/actuator-lag[rudder]", "nps/sensor-delay[psi]"))
+    start = jnp.asarray(bodies.start_state("nps", vehicle, rng))
+    course, depth = start[vehicle.layout.states.index("psi")], start[vehicle.layout.states.index("z")]
+    wanted = jnp.tile(jnp.stack([course + 0.5, depth + 1.0, jnp.asarray(1.8), jnp.asarray(0.05)]), (200, 1))
+    errors = jnp.asarray(1e-3 * rng.standard_normal((200, len(channels))))
+    sizes = jnp.asarray([0.5, 0.3])
+    held = steered(vehicle, concealed, sizes, start[None], wanted[None], errors[None])
+    drive = Drive(start[None], held[:, :-1], jnp.zeros((1, 200, len(vehicle.layout.equations))))
+    shown = np.asarray(outputs(vehicle, concealed, sizes, drive)[0])[0]
+    measured = [dict(zip(channels, row, strict=True)) for row in shown + errors]
+    again = [autopilot.command(*pair) for pair in zip(wanted, measured, strict=True)]
+    np.testing.assert_allclose(held[0], np.stack(again), atol=1e-9)
+    ended = dict(zip(channels, shown[-1], strict=True))
+    assert abs(ended["psi"] - course - 0.5) < 0.1
+    assert 0.5 < ended["z"] - depth < 1.5
+    assert 0.01 < ended["phi"] < 0.1
+
+
+def test_a_nonlinear_file_has_its_own_forces_and_conceals_others():
+    """Claim: sway at rest in yaw meets the quadratic drag that the file states, and nothing it has is concealed."""
+    plain, nonlinear = (bodies.body("nps", nonlinear=one) for one in (False, True))
+    state = jnp.zeros(len(plain.layout.states)).at[jnp.asarray([0, 1])].set(jnp.asarray([plain.speed, 0.3]))
+    signals = jnp.zeros(len(plain.layout.inputs) + 1)
+    sway = lambda v: float((v.force(v.motion(state, signals)) + v.damping_matrix() @ state[:6])[1])
+    assert sway(nonlinear) - sway(plain) == pytest.approx(-4200.0 * 0.3**2)
+    names = {truths.TRUTHS[case.concealed[0]].name for case in plan.cases("nonlinear", 60)}
+    assert len(names) > 25
+    assert not names & {"coriolis-coupling", "quadratic-damping", "crossflow-drag", "current"}
+
+
+def test_ten_effects_are_of_ten_kinds_on_one_vehicle():
+    """Claim: no two of one family are the same effect, or in the same place."""
+    for case in plan.cases("ten", 12):
+        chosen = [truths.TRUTHS[key] for key in case.concealed]
+        assert len({truth.name for truth in chosen}) == len(chosen) == 10
+        assert len({(truth.family, truth.where) for truth in chosen}) == 10
+        assert {truth.vehicle for truth in chosen} == {"nps"}
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_run_that_is_cut_off_has_every_condition_in_proportion(fresh):
+    """Claim: of the first cases of the order, however many, each condition has its share to within two."""
+    counts = {name: of.fresh if fresh else of.planned for name, of in plan.CONDITIONS.items()}
+    listed = plan.ordered(counts, fresh)
+    assert len({case.name for case in listed}) == len(listed) == sum(counts.values())
     assert len({case.seed for case in listed}) == len(listed)
-    tenth = [case.condition for case in listed[: len(listed) // 10]]
-    assert set(tenth) == set(plan.COUNTS)
+    assert all(case.fresh is fresh for case in listed)
+    for count in range(len(listed)):
+        begun = [case.condition for case in listed[:count]]
+        off = [begun.count(name) - count * of / len(listed) for name, of in counts.items()]
+        assert max(map(abs, off)) < 2.0
+
+
+def test_a_round_has_every_effect():
     names = len(truths.by_name())
     first = [truths.TRUTHS[case.concealed[0]].name for case in plan.cases("strong", names)]
     assert sorted(first) == sorted(truths.by_name())
@@ -126,6 +193,42 @@ def test_a_short_plan_covers_every_condition_and_a_round_every_effect():
 )
 def test_right_is_named_or_among_at_most_four(names, given, expected):
     assert scoring.right(names, given) is expected
+
+
+def many(verdict, names, after):
+    """An answer that names `names`, and leaves `after` times the noise where the baseline leaves five times that."""
+    return answer(verdict, *[(n, 1.0, []) for n in names]) | {
+        "held_out_rms": {"baseline": {"y": 10.0}, "improved": {"y": 2.0 * after}}
+    }
+
+
+@pytest.mark.parametrize(
+    "given, expected",
+    [
+        (many("named", "abc", after=2.0), True),
+        (many("named", "abc", after=3.0), False),
+        (many("named", "abx", after=1.0), False),
+        (many("unknown", "", after=1.0), False),
+        (many("named", "", after=1.0), False),
+        (answer("named", ("a", 1.0, [])), True),
+    ],
+)
+def test_of_many_effects_the_named_are_true_and_most_is_explained(given, expected):
+    """Claim: three of ten effects suffice if none is false and 3/4 of the excess variance goes: 21/24, not 16/24."""
+    assert scoring.right_of_many("abcdefghij", given, {"y": 2.0}) is expected
+
+
+def test_a_folder_takes_answers_of_one_engine(tmp_path, monkeypatch, capsys):
+    """Claim: a run does not go on from another engine's answers, and ends where the sources have changed since."""
+    begun = {"case": "strong-000", "engine": {"commit": "0123456789", "sources": "of another"}}
+    (tmp_path / "cases.jsonl").write_text(json.dumps(begun) + "\n")
+    monkeypatch.setattr("sys.argv", ["battery", "--fresh", "--out", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        battery.main()
+    assert "0123456789" in capsys.readouterr().err
+    engine.require(engine.engine())
+    with pytest.raises(RuntimeError, match="0123456789"):
+        engine.require(engine.Engine(**begun["engine"]))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.concealed_physics.bodies import INTERVAL
 from experiments.concealed_physics.logs import LOGGED, white
-from experiments.concealed_physics.plan import COUNTS, cases
+from experiments.concealed_physics.plan import CONDITIONS, Way, cases
 
 SIGMA = np.array([0.1, 2.0, 5.0])
 
@@ -48,10 +48,11 @@ def test_quantised_sensors_show_whole_steps_and_noise_varies_six_fold(logged):
 
 
 def test_conditions_are_recorded_so_and_leave_earlier_seeds_as_they_were():
-    """Claim: each condition of logs is in the plan, after all others, so that no case before has another seed."""
-    assert set(LOGGED) < set(COUNTS)
-    assert [*COUNTS][-len(LOGGED) :] == [*LOGGED]
-    assert cases("none_double", 1)[0].seed == 13_000
+    """Claim: each way of recording is a condition, and one of clean cases; new conditions leave seeds as they were."""
+    assert all(CONDITIONS[name].ways == (Way(logs=name),) for name in LOGGED)
+    assert set(LOGGED) < {case.way.logs for case in cases("none_logs", CONDITIONS["none_logs"].planned)}
+    seeds = {"none_double": 13_000, "estimated": 14_000, "quantised": 20_000, "closed_loop": 21_000}
+    assert {name: cases(name, 1)[0].seed for name in seeds} == seeds
     assert np.std(white(np.zeros((1, 4000, 3)), SIGMA, np.random.default_rng(1)) / SIGMA) == pytest.approx(
         1.0, abs=0.03
     )
