@@ -260,7 +260,7 @@ def dominant(selector: Selector, chosen: Sequence[int]) -> list[int]:
     before = selector.value([])
     gains = {index: selector.value([index]) - before for index in chosen}
     best = max(gains, key=lambda index: gains[index])
-    return [best] if gains[best] > settings.DOMINANT_SHARE * (selector.value(chosen) - before) else []
+    return [best] if gains[best] > settings.NEARLY_ALL * (selector.value(chosen) - before) else []
 
 
 def accept_proposed(

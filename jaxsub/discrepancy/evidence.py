@@ -72,8 +72,7 @@ class Evidence:
         first = raw.under(own)
         length = root_or_one(np.diag(first.gram)[known:])
         made = dataclasses.replace(raw, length=length)
-        smaller = [dataclasses.replace(own, force=share * own.force) for share in settings.DISTURBANCE_SHARES]
-        for disturbance in disturbances or [own, *smaller]:
+        for disturbance in disturbances or with_smaller(own):
             made.products.append(first.scaled(made._unit) if disturbance is own else made.under(disturbance))
         return made
 
@@ -176,6 +175,11 @@ class Evidence:
         values = [products.log_evidence(chosen) for products in self.products]
         best = int(np.argmax(values))
         return values[best], self.products[best]
+
+
+def with_smaller(one: Disturbance) -> list[Disturbance]:
+    """A disturbance and shares of it, which absorb less of what is missing."""
+    return [one, *(dataclasses.replace(one, force=share * one.force) for share in settings.DISTURBANCE_SHARES)]
 
 
 def most_columns() -> int:

@@ -140,7 +140,7 @@ def segments_needed(view: View) -> int | None:
     while pieces <= runs.times.shape[1] // settings.FEWEST_SAMPLES:
         shown = restarted(view.vehicle, view.followed, runs, pieces)
         rms = concentrated_sigma(residual_outputs(view.vehicle, runs, shown), runs)
-        if np.all(np.asarray(rms**2 - view.sigma**2) < settings.RESTART_ERROR * variance):
+        if np.all(np.asarray(rms**2 - view.sigma**2) < (1.0 - settings.NEARLY_ALL) * variance):
             return pieces
         pieces *= 2
     return None

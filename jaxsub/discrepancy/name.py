@@ -111,7 +111,7 @@ def _led(selector: Selector, chosen: list[int]) -> Scan:
         scan = selector.scan(chosen)
         best = int(np.argmax(scan.value))
         gain = scan.value[best] - selector.value(chosen)
-        if not np.isfinite(gain) or gain < -settings.ESTIMATED_LOG_BAYES:
+        if not np.isfinite(gain) or gain < -settings.CLEAR_LOG_BAYES:
             return scan
         if tuple(sorted([*chosen, best])) in selector.estimated:
             return scan
@@ -166,9 +166,9 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
         key = effect.label if effect.name == own else effect.name
         if log[i] > log[best.setdefault(key, i)]:
             best[key] = i
-    rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > settings.RIVAL_PROBABILITY]
+    rivals = [(scan.effects[best[n]], p) for n, p in by_name.items() if n != own and p > 0.0]
     # coefficients absorb the linearisation error as they absorb the effect, but not as exactly
-    off = min(settings.MOST_SCORE_ERROR, settings.SCORE_ERROR / np.sqrt(max(selector.kept[index], 1e-12)))
+    off = min(settings.MAJORITY, settings.SCORE_ERROR / np.sqrt(max(selector.kept[index], 1e-12)))
     near = [j for key, j in best.items() if key != label and np.isfinite(log[j])]
     place = scan.effects[index].where
     # where a motion is no larger than its noise, the filtered trajectory favours the square of a rate over its cube
@@ -201,7 +201,7 @@ def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Na
     share = named.probability + sum(p for rival, p in named.rivals if rival.name in names)
     found = [(effect, share * float(w)) for (effect, _), w in zip(values, weights, strict=True)]
     others = [pair for pair in named.rivals if pair[0].name not in names]
-    others += [pair for pair in found if pair[0].name != named.effect.name and pair[1] > settings.RIVAL_PROBABILITY]
+    others += [pair for pair in found if pair[0].name != named.effect.name]
     probability = min(1.0, sum(p for effect, p in found if effect.name == named.effect.name))
     return dataclasses.replace(named, probability=probability, rivals=sorted(others, key=lambda pair: -pair[1]))
 

@@ -15,7 +15,7 @@ from ..effects import KNOTS, SmoothForce, with_numbers
 from ..likelihood import Disturbance, smoothed
 from . import settings
 from .columns import columns_of
-from .evidence import Evidence
+from .evidence import Evidence, with_smaller
 from .products import Products, conditional
 from .smoothness import FINE, Smooth, coarse, smoothest
 from .spline_basis import basis_forces, promising_forces, smooth_forces
@@ -99,11 +99,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     system = chosen.within(columns, under[-1]).view.followed.system
     mean, _ = smoothed(under[-1].disturbance, system, left)
     weighed = promising_forces(view, forces, np.asarray(mean))
-    asked = [
-        p.disturbance if share == 1.0 else dataclasses.replace(p.disturbance, force=share * p.disturbance.force)
-        for p in under
-        for share in settings.FORCE_DISTURBANCE_SHARES
-    ]
+    asked = [one for products in under for one in with_smaller(products.disturbance)]
     # one force after the other: products between forces are not needed
     picked = chosen.columns.picked([c for c in columns if c < len(chosen.columns)])
     beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))

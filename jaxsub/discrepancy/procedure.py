@@ -37,8 +37,8 @@ from .validation import beyond_noise
 from .verdict import Judged
 from .view import View, look
 
-# rivals of an effect that are listed
-_LISTED = 4
+# most rivals of an effect that are listed, and the posterior probability above which they are
+_LISTED, _LISTED_PROBABILITY = 4, 0.02
 # rms of a filtered disturbance force over its estimated standard deviation above which it is reported
 _REPORTED_DISTURBANCE = 0.3
 
@@ -212,15 +212,20 @@ def _explanations(judged: Judged, improved: AbstractVehicle) -> tuple[AbstractVe
         return ()
     least = min(judged.named, key=lambda named: named.probability)
     without = improved.without_effect(least.effect.label)
-    rivals = [rival for rival, _ in least.rivals[: settings.ALTERNATIVES]]
+    rivals = [rival for rival, _ in _listed(least)[: settings.ALTERNATIVES]]
     return (improved, *(without.with_effect(rival) for rival in rivals))
+
+
+def _listed(named: Named) -> list[tuple[AbstractEffect, float]]:
+    """The most probable rivals."""
+    return [(rival, p) for rival, p in named.rivals if p > _LISTED_PROBABILITY][:_LISTED]
 
 
 def _physics(named: Named, improved: Solution) -> Physics:
     """An accepted effect with its numbers from the final fit."""
     own = next((e for e in improved.vehicle.all_effects if e.label == named.effect.label), named.effect)
     effect = with_numbers(named.effect, numbers(own))
-    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in named.rivals[:_LISTED]]
+    rivals = [Rival(rival.name, rival.label, probability) for rival, probability in _listed(named)]
     return Physics(
         effect.name,
         effect.label,

@@ -159,8 +159,8 @@ class Selector:
         effects, taken = _WithAmplitudes(self.candidates, sizes), {self.candidates[i].label for i in chosen}
         fresh = np.array([effect.label not in taken for effect in self.candidates], bool)
         right = self.usable & self._admitted(sizes) & fresh
-        # worth a look only where it may be chosen
-        for i in np.flatnonzero(right & (statistic >= settings.PLAUSIBILITY_SCORE)):
+        # worth a look only where evidence rises, so that it may be chosen
+        for i in np.flatnonzero(right & (best + self.prior > base)):
             right[i] = plausible(self.evidence.view, effects[i])
         fine = right & (len(own) + np.array([len(columns) for columns in self.owners]) <= most_columns())
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))

@@ -1,4 +1,4 @@
-"""Every constant that can change a verdict or the improved model, in the order of a diagnosis.
+"""Every constant that can change a verdict or the improved model: levels and shares, then by step of a diagnosis.
 
 Shares are of one, levels are of p-values, and scores are $\\chi^2$. What changes no verdict, no accepted effect and no
 number of the improved model stands where it is used: bounds of rounding errors, how a search converges, and how a
@@ -6,6 +6,22 @@ report locates a mismatch and lists results.
 """
 
 from typing import Final
+
+# Levels and shares
+
+# level at which a candidate, a force (both corrected for all tried) or a fitted amplitude is significant, and at which
+# a model with more predicts better: several are compared in one diagnosis, at two horizons each
+SIGNIFICANCE: Final[float] = 0.01
+# level of one test: that a model predicts worse, of a filter's alarm, of a regime; and of confidence bounds
+LEVEL: Final[float] = 0.05
+# log Bayes factor from which one explanation is clearly better than another
+CLEAR_LOG_BAYES: Final[float] = 3.0
+# the larger share of a variance, an error or a score: above it something explains, or keeps, most
+MAJORITY: Final[float] = 0.5
+# share that is nearly all: of the gain in log evidence of a set, from which its best effect is first fitted by itself;
+# of an effect's, which the linearised model without it must restore; of a channel's variance, which simulation in parts
+# of a run must follow
+NEARLY_ALL: Final[float] = 0.9
 
 # Filter and disturbance
 
@@ -17,21 +33,10 @@ PRIOR_WIDTH: Final[float] = 10.0
 # missing
 DISTURBANCE_SHARES: Final[tuple[float, ...]] = (0.1, 0.003)
 
-# Candidates and evidence
+# Candidates
 
-# level at which a candidate, a force (both corrected for all tried) or a fitted amplitude is significant, and at which
-# a model with more predicts better: several are compared in one diagnosis, at two horizons each
-SIGNIFICANCE: Final[float] = 0.01
 # share of a candidate's sensitivity that the free parameters must leave for it to be identifiable
 IDENTIFIABLE_SHARE: Final[float] = 1e-4
-# score from which a sensor error must be smaller than what the sensor shows
-PLAUSIBILITY_SCORE: Final[float] = 10.0
-# score of a wave from which its frequency is refined
-TONE_SCORE: Final[float] = 25.0
-# ridge of the regression that picks these forces, in samples at each knot
-FORCE_RIDGE: Final[float] = 0.5
-# disturbances under which a nonparametric force is sought, of those estimated without and with the chosen effects
-FORCE_DISTURBANCE_SHARES: Final[tuple[float, ...]] = (1.0, 0.1, 0.01)
 # length scales of a nonparametric force, of the range of its variable
 LENGTH_SCALES: Final[tuple[float, ...]] = (1 / 3, 1 / 10, 1 / 30)
 
@@ -42,42 +47,24 @@ MOST_EFFECTS: Final[int] = 4
 # alternatives to the best that are tried: rivals fitted in its place, forces whose evidence is computed beside the one
 # that predicts most, disturbances estimated for those that lead next, narrower priors, and rounds after the first
 ALTERNATIVES: Final[int] = 2
-# log Bayes factor from which one explanation is clearly better than another
-CLEAR_LOG_BAYES: Final[float] = 3.0
-# log Bayes factor by which the leading candidate may be worse than none and its own disturbance is still estimated
-ESTIMATED_LOG_BAYES: Final[float] = 5.0
-# the larger share of a variance, an error or a score: above it something explains, or keeps, most
-MAJORITY: Final[float] = 0.5
 # relative error of a score by linearisation, over the root of the share that the free parameters leave
 SCORE_ERROR: Final[float] = 0.03
-# largest relative error of a score by linearisation
-MOST_SCORE_ERROR: Final[float] = 0.3
-# share of the squared simulation error at or below which the best candidate gives way to one of a major share
+# share of the squared simulation error that is hardly any: at or below it the most probable candidate gives way to one
+# of a major share, and surrogate terms are not worth a fit
 MINOR_SHARE: Final[float] = 0.02
 # share of the squared simulation error above which a candidate is preferred to one of a minor share
 MAJOR_SHARE: Final[float] = 0.2
 # squared simulation error that a chosen effect may leave, in units of what the best nonparametric force leaves
 FORCE_RATIO: Final[float] = 4.0
-# share of a gain in log evidence that is nearly all of it: of a set's, from which its best effect is first fitted by
-# itself; of an effect's, which the linearised model without it must restore
-DOMINANT_SHARE: Final[float] = 0.9
 
 # Acceptance
 
-# level of one test: that a model predicts worse, of a filter's alarm, of a regime; and of confidence bounds
-LEVEL: Final[float] = 0.05
 # blocks of each run that the others predict, by simulation; and at least of all runs where candidates are proposed
 BLOCKS: Final[int] = 4
 # blocks of each run that the others predict, one step ahead: innovations are correlated for less long
 BLOCKS_ONE_STEP: Final[int] = 24
 # fewest samples of the parts into which a run of an unstable model is cut for simulation
 FEWEST_SAMPLES: Final[int] = 8
-# share of a channel's variance that simulation of these parts may leave
-RESTART_ERROR: Final[float] = 0.1
-# sets of surrogate terms that are fitted in one round
-SURROGATE_FITS: Final[int] = 5
-# share of the squared simulation error that surrogate terms must remove
-SURROGATE_GAIN: Final[float] = 0.01
 # share of the squares that a surrogate term must explain, and that an equation in which a number acts must hold
 PLACE_SHARE: Final[float] = 0.05
 
@@ -85,8 +72,6 @@ PLACE_SHARE: Final[float] = 0.05
 
 # posterior probability from which an effect is named and not ambiguous
 CERTAIN: Final[float] = 0.9
-# posterior probability above which another effect is a rival
-RIVAL_PROBABILITY: Final[float] = 0.02
 # share of the mismatch that effects must explain to be its cause
 EXPLAINED: Final[float] = 0.75
 # level at which residuals are correlated in time, or with an input

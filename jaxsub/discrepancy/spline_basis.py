@@ -58,7 +58,8 @@ def _predicted_share(view: View, force: SmoothForce, missing: np.ndarray) -> np.
     H, y = [drawn[r, piece] for r, piece in pieces], [missing[r, piece] for r, piece in pieces]
     G = np.array([h.T @ h for h in H])
     b, squares = np.array([h.T @ v for h, v in zip(H, y, strict=True)]), np.array([np.sum(v**2, axis=0) for v in y])
-    others = G.sum(axis=0) - G + settings.FORCE_RIDGE * np.eye(_CHOOSING)
+    # the prior of each height is worth one sample
+    others = G.sum(axis=0) - G + np.eye(_CHOOSING)
     w = np.linalg.solve(others, b.sum(axis=0) - b)
     left = squares - 2.0 * np.sum(w * b, axis=1) + np.sum(w * (G @ w), axis=1)
     return 1.0 - left.sum(axis=0) / np.maximum(squares.sum(axis=0), 1e-300)

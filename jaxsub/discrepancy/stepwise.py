@@ -129,7 +129,7 @@ class _Search:
             own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
             number = max(own, key=lambda i, value=scan.value: value[i])
             without, again = (selector.evidence.best(selector.columns(some))[0] for some in ([], [number]))
-            if np.isfinite(scan.value[number]) and whole - again < (1.0 - settings.DOMINANT_SHARE) * (whole - without):
+            if np.isfinite(scan.value[number]) and whole - again < (1.0 - settings.NEARLY_ALL) * (whole - without):
                 break
         if not np.isfinite(scan.value[number]):
             return one, []

@@ -74,7 +74,7 @@ def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Select
     fits, disturbance = 0, selector.evidence.best([])[1].disturbance
     for products in (selector.free, *reversed(selector.evidence.given)):
         asked = most_explaining(selector, products)
-        while asked and fits < settings.SURROGATE_FITS:
+        while asked and fits < settings.MOST_EFFECTS:
             more, fits = _fitted(fitter, named, model, asked, disturbance), fits + 1
             wrong = {effect.label for effect in asked if not is_admissible(more.fit, [effect])}
             if wrong:
@@ -95,7 +95,7 @@ def _worth(model: Model, more: Model) -> bool:
     A significant but negligible change would cost another round of fits.
     """
     gain = compare(model.predicted, more.predicted)
-    better = gain.ratio < 1.0 - settings.SURROGATE_GAIN and float(more.fit.cost) < float(model.fit.cost)
+    better = gain.ratio < 1.0 - settings.MINOR_SHARE and float(more.fit.cost) < float(model.fit.cost)
     return more.view.finite and gain.accepted and better
 
 

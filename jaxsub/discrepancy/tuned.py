@@ -10,6 +10,7 @@ $(t-m)\cos\omega t$ (Golub and Pereyra 1973, SIAM J. Numer. Anal. 10).
 import dataclasses
 
 import numpy as np
+from scipy import special
 
 from ..effects import Facts
 from . import settings
@@ -32,7 +33,7 @@ def tuned(view: View, known: Facts) -> Facts:
     line = 2.0 * np.pi / known.duration
     best, most = now, np.full(len(now), -np.inf)
     for _ in range(1 + _STEPS):
-        value, step = _looked(view, equations, now, 0.5 * known.duration)
+        value, step = _looked(view, known, equations, now)
         best, most = np.where(value > most, now, best), np.maximum(value, most)
         step = np.where(value < most, 0.0, np.clip(step, -line, line))
         if np.all(np.abs(step) < _NEAR * line):
@@ -42,7 +43,7 @@ def tuned(view: View, known: Facts) -> Facts:
     return dataclasses.replace(known, tones=own)
 
 
-def _looked(view: View, equations: list[str], omega: np.ndarray, middle: float) -> tuple[np.ndarray, np.ndarray]:
+def _looked(view: View, known: Facts, equations: list[str], omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Log evidence of a wave in each of n equations at each of n frequencies, and the step to where there is more."""
     free = view.vehicle.layout.equations
     times = np.stack([view.path.start.time, view.path.end.time])
@@ -50,19 +51,20 @@ def _looked(view: View, equations: list[str], omega: np.ndarray, middle: float) 
     for equation, tone in zip(equations, omega, strict=True):
         own = np.array([float(e == equation) for e in free])
         cos, sin = np.cos(tone * times), np.sin(tone * times)
-        late = times - middle
+        late = times - 0.5 * known.duration
         forces += [signal[..., None] * own for signal in (cos, sin, late * sin, late * cos)]
     evidence = Evidence.of(view, columns_of(view, forces))
-    looks = [_of(products, evidence.length, len(omega)) for products in evidence.products]
+    looks = [_of(products, evidence.length, len(omega), known.frequencies) for products in evidence.products]
     value, step = (np.stack(parts) for parts in zip(*looks, strict=True))
     first = np.argmax(value, axis=0), np.arange(len(omega))
     return value[first], step[first]
 
 
-def _of(products: Products, length: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The same under one disturbance."""
+def _of(products: Products, length: np.ndarray, count: int, tried: int) -> tuple[np.ndarray, np.ndarray]:
+    """The same under one disturbance; a wave that is not significant among all frequencies `tried` stays."""
     wave = products.gains([], [[4 * i, 4 * i + 1] for i in range(count)])
     near = products.gains([], [range(4 * i, 4 * i + 4) for i in range(count)])
     a, b, p, q = (np.stack(near.amplitudes) / length.reshape(count, 4)).T
-    step = np.where(wave.statistic > settings.TONE_SCORE, (b * q - a * p) / np.maximum(a * a + b * b, 1e-300), 0.0)
+    significant = tried * special.chdtrc(2, wave.statistic) < settings.SIGNIFICANCE
+    step = np.where(significant, (b * q - a * p) / np.maximum(a * a + b * b, 1e-300), 0.0)
     return products.log_evidence([]) + wave.evidence, step

@@ -38,7 +38,7 @@ ALLOWED = {
         "regime.py": {"_SHIFTS", "_AREA", "_SHARE"},
     },
     "is what a report lists": {
-        "consistency.py": {"_LISTED"}, "procedure.py": {"_LISTED", "_REPORTED_DISTURBANCE"},
+        "consistency.py": {"_LISTED"}, "procedure.py": {"_LISTED", "_LISTED_PROBABILITY", "_REPORTED_DISTURBANCE"},
         "show.py": {"_CLOSE", "_NOT_EXCITED"},
     },
     "designs the next manoeuvre, after the verdict": {
@@ -126,6 +126,9 @@ def test_settings_are_read_where_they_are_used():
         whole = [node for node in tree.body if not isinstance(node, ast.FunctionDef | ast.ClassDef)]
         defaults = [node.args for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.Lambda)]
         assert not set().union(*map(_read, [*whole, *defaults])), f"{path.name} reads settings as it is imported"
+        functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+        traced = [node for node in functions if "compiled" in map(ast.unparse, node.decorator_list)]
+        assert not set().union(*map(_read, traced)), f"{path.name} compiles settings into a program"
         named = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
         assert "settings" not in named, f"{path.name} imports values of settings"
 

@@ -32,7 +32,8 @@ def test_the_same_effect_elsewhere_is_fitted_and_is_no_rival():
     """Claim: drag of nearly the same χ² in another equation is a twin and shares the name's probability."""
     here, there, cubic = QuadraticDamping("x", -0.5), QuadraticDamping("y", -0.5), CubicDamping("y", -0.5)
     found = named_on(Scanned([600.0, 595.0, 400.0], here=here, there=there, cubic=cubic), [], 0)
-    assert (found.collinear, found.rivals, found.probability) == ([1], [], pytest.approx(1.0))
+    assert (found.collinear, found.probability) == ([1], pytest.approx(1.0))
+    assert [rival.name for rival, _ in found.rivals] == ["cubic-damping"]
     assert refitted(found, [(there, -10.0), (here, -11.0)]).probability == pytest.approx(1.0)
 
 
