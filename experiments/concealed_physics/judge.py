@@ -17,6 +17,7 @@ def judge(folder: Path) -> dict:
         vehicle = read_vehicle(folder / "vehicle.toml")
         train, test = hold_out(load_train_and_test(runs, (), vehicle)[0])
         answer = answered(vehicle, train, test, manoeuvre=False)
+        (folder / "out").mkdir()
         answer.write(folder / "out")
     except Exception as failed:  # whatever stops it is an answer too
         return {"error": f"{type(failed).__name__}: {failed}"[-600:]}

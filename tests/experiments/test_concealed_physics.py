@@ -12,6 +12,7 @@ from experiments.concealed_physics import __main__ as battery
 from experiments.concealed_physics import autopilot, bodies, engine, plan, scoring, truths
 from experiments.concealed_physics.actuators import ACTUATORS
 from experiments.concealed_physics.generate import generate
+from experiments.concealed_physics.judge import judge
 from experiments.concealed_physics.simulate import Drive, outputs, states, steered
 from experiments.concealed_physics.sizing import Unabsorbed
 from jaxsub.recording import load
@@ -275,3 +276,16 @@ def test_calibration_puts_each_statement_in_one_bin():
     bins = scoring.calibration(pairs)
     assert sum(cell["n"] for cell in bins) == 3
     assert [cell["rate"] for cell in bins] == [0.0, 0.0, 1.0]
+
+
+@pytest.mark.long
+def test_a_case_is_answered_from_its_files_and_counts_where_sigma_is_estimated(tmp_path):
+    """Claim: a cubic spring is named in recordings of unknown noise, and the test error is that noise."""
+    case = plan.Case("estimated", 0, (KEY,), 5.0, plan.Way("estimated", seconds=40.0))
+    truth = generate(case, tmp_path)
+    given = judge(tmp_path)
+    assert scoring.right(truth["names"], given), given
+    assert given["cpu_seconds"] > 0.0
+    errors = scoring.held_out(given, truth["floor"])
+    assert errors is not None
+    assert errors["after"] == pytest.approx(1.0, abs=0.05) and errors["before"] > 1.5
