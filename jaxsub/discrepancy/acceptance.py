@@ -310,7 +310,7 @@ def proposed_effects(found: Examination, judged: Judged) -> list[int]:
     if not np.any(share):
         return []
     nameless = 1.0 - most_explained(found.view, selector.free.disturbance)
-    for among, less in ((numbers, settings.FORCE_RATIO), (range(len(share)), 1.0)):
+    for among, less in ((numbers, settings.LARGE_ERROR**2), (range(len(share)), 1.0)):
         best = max(among, key=lambda i: share[i], default=None)
         if best is not None and share[best] > 0.0 and 1.0 - share[best] <= less * nameless:
             selector.freely.add(best)

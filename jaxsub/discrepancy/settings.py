@@ -1,8 +1,8 @@
 """Every constant that can change a verdict or the improved model: levels and shares, then by step of a diagnosis.
 
-Shares are of one, levels are of p-values, and scores are $\\chi^2$. What changes no verdict, no accepted effect and no
-number of the improved model stands where it is used: bounds of rounding errors, how a search converges, and how a
-report locates a mismatch and lists results.
+Shares are of one, and levels are of p-values. What changes no verdict, no accepted effect and no number of the improved
+model stands where it is used: bounds of rounding errors, how a search converges, and how a report locates a mismatch
+and lists results.
 """
 
 from typing import Final
@@ -25,7 +25,8 @@ NEARLY_ALL: Final[float] = 0.9
 
 # Filter and disturbance
 
-# rms of a residual over σ above which it is far above the noise
+# ratio of rms errors above which one is far above the other: a residual and σ, or what a chosen effect leaves of a
+# simulation error and what the best nonparametric force leaves
 LARGE_ERROR: Final[float] = 2.0
 # prior standard deviation of a coefficient that has none, in units of its size
 PRIOR_WIDTH: Final[float] = 10.0
@@ -54,8 +55,6 @@ SCORE_ERROR: Final[float] = 0.03
 MINOR_SHARE: Final[float] = 0.02
 # share of the squared simulation error above which a candidate is preferred to one of a minor share
 MAJOR_SHARE: Final[float] = 0.2
-# squared simulation error that a chosen effect may leave, in units of what the best nonparametric force leaves
-FORCE_RATIO: Final[float] = 4.0
 
 # Acceptance
 
