@@ -27,10 +27,11 @@ class Descent:
     """One damped Gauss–Newton search, a pass over all samples at a time."""
 
     def __init__(self, method: "GaussNewton", problem: Problem, start: Float[Values, " d"]):
-        self._solver, self._most, self.problem = method.solver, method.max_steps, problem
+        self._solver, self._method, self.problem = method.solver, method, problem
         self._y = self._trial = jax.device_put(np.asarray(start))
         self._state: State | None = None
         self._decrements: list[float] = []
+        self._costs: list[float] = []
         self._result: RESULTS | None = None
         self.done = False
 
@@ -53,7 +54,9 @@ class Descent:
             self._state = self._solver.begin(self._y, eqx.filter_eval_shape(self.problem.expansion, self._y, gram))
         self._y, self._state, done, self._result = _step(self._solver, self.problem, self._y, self._state, gram)
         self._decrements.append(float(self._state.decrement))
-        self._trial, self.done = self._state.trial, bool(done) or self.passes >= self._most
+        self._costs.append(self.cost)
+        crawls = self.passes > _ROUND and self._costs[-1 - _ROUND] - self.cost < self._method.least
+        self._trial, self.done = self._state.trial, bool(done) or crawls or self.passes >= self._method.max_steps
 
     @property
     def found(self) -> Found:
@@ -66,10 +69,12 @@ class GaussNewton(Iterative):
     """Damped Gauss–Newton; one search goes block by block, and tells how far it is.
 
     It takes the programs that a fit's statistics need anyway. Many searches, and those of compiled C, go through a pool
-    as those of any method.
+    as those of any method. One that goes block by block also ends, as after `max_steps`, where its last twelve passes
+    have lowered the cost by less than `least`.
     """
 
     solver: Damped
+    least: float = eqx.field(static=True, default=0.0)
 
     def run(
         self,

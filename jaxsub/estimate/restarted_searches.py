@@ -1,5 +1,6 @@
 """Searches that begin where others have ended, or from several vehicles at once."""
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,14 +13,21 @@ from .fitting import AbstractSearchEnd, SearchEnd, concentrated
 from .methods import gauss_newton
 from .problem import Problem
 
+# of log likelihood: no decision between models hangs on less, and in a curved valley a search can crawl for long
+_NEGLIGIBLE = 0.1
+# passes between two estimates of standard deviations between runs, each of which is exact where the model is linear;
+# the first half of them may be spent on finding a damping under which a step leads down
+_PASSES = 12
+
 
 def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " c"]) -> SearchEnd:
-    """The best of searches from several `vehicles`, as `search` finds it; those that fall behind are given up.
+    """The best of searches from several `vehicles`; those that fall behind are given up, and one that crawls ends.
 
     `runs` are stacked recordings, and `sigma` (c,) is the noise of their channels, SI.
     """
     begun = [Problem.of(vehicle, runs, sigma) for vehicle in vehicles]
-    best = raced([Descent(gauss_newton(), problem, problem.coordinates()) for problem in begun])
+    method = dataclasses.replace(gauss_newton(), least=_NEGLIGIBLE)
+    best = raced([Descent(method, problem, problem.coordinates()) for problem in begun])
     found = best.found.one(0)
     fitted, states = best.problem.split(found.y)
     return SearchEnd(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
@@ -29,4 +37,5 @@ def with_estimated_spreads(ended: AbstractSearchEnd, names: Sequence[str]) -> Se
     """The search on from where it `ended`, the standard deviations between runs of the numbers `names` open."""
     problem = Problem.of(ended.vehicle, ended.runs, ended.sigma)
     y = problem.coordinates_of(ended.vehicle, ended.start)
-    return concentrated(problem, y, np.zeros(len(ended.sigma), bool), tuple(names))
+    method = dataclasses.replace(gauss_newton(), max_steps=_PASSES)
+    return concentrated(problem, y, np.zeros(len(ended.sigma), bool), tuple(names), method)
