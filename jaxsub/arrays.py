@@ -23,9 +23,9 @@ def namespace(*values: Any) -> Any:
     return jnp if any(isinstance(value, jax.Array) for value in values) else np
 
 
-def aligned_zeros(shape: tuple[int, ...]) -> np.ndarray:
+def aligned_zeros(shape: tuple[int, ...], dtype: Any = float) -> np.ndarray:
     """Zeros that `jax.device_put` places on a CPU without a copy: 64-byte aligned. They are not to change after it."""
-    size, width = math.prod(shape), 8
-    memory = np.zeros(size + width)
-    first = -memory.ctypes.data // memory.itemsize % width
-    return memory[first : first + size].reshape(shape)
+    size, width = math.prod(shape) * np.dtype(dtype).itemsize, 64
+    memory = np.zeros(size + width, np.uint8)
+    first = -memory.ctypes.data % width
+    return memory[first : first + size].view(dtype).reshape(shape)

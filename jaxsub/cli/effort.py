@@ -8,7 +8,9 @@ from collections.abc import Callable
 
 import jax
 
+from ..likelihood import shares
 from ..likelihood.blocks import block_length
+from ..programs import cores
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from . import terminal
@@ -69,7 +71,9 @@ class Effort:
         self._recorded = 1 + runs.signals.shape[-1] + self._channels
         self._coefficients = len(layout.free)
         self._columns = self._coefficients + self._states + 2 * len(layout.equations)
-        self._at_once = block_length(vehicle, runs) * len(runs.times)
+        every = shares(*runs.times.shape)
+        share = runs.share(every[0])
+        self._at_once = block_length(vehicle, share) * len(share.times) * min(cores(), len(every))
 
     def announcement(self) -> str:
         """What the fit of long runs will take, empty where they are short."""

@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from jaxtyping import Array
 
-from ..arrays import Values, quietly
+from ..arrays import Values, aligned_zeros, quietly
 from ..effects import (
     EQUATIONS,
     AbstractActuator,
@@ -26,7 +26,7 @@ from ..effects import (
     with_memories,
     with_numbers,
 )
-from ..likelihood import Columns
+from ..likelihood import Columns, padded_width
 from ..programs import compiled
 from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle
@@ -88,6 +88,23 @@ class EffectColumns:
         made = Columns(np.zeros((*system.C.shape[:3], len(self))), np.zeros((*system.A.shape[:3], len(self))))
         self.write(made, slice(None))
         return made
+
+    def placed(self, runs: slice) -> Columns:
+        """The view's own columns and these in a share of the runs, padded to the width of a program.
+
+        They are placed where programs take them from, copied once. What a share has beyond the last run is empty.
+        """
+        known, size = len(self.view.prior), runs.stop - runs.start
+
+        def beside(own: np.ndarray) -> np.ndarray:
+            whole = aligned_zeros((size, *own.shape[1:3], padded_width(known + len(self))))
+            whole[: len(own[runs]), ..., :known] = own[runs]
+            return whole
+
+        made = jax.tree.map(beside, self.view.base)
+        there = len(self.view.base.shown[runs])
+        self.write(jax.tree.map(lambda M: M[:there, ..., known : known + len(self)], made), runs)
+        return jax.tree.map(jax.device_put, made)
 
     def write(self, onto: Columns, runs: slice) -> None:
         """Write what some of the runs have of the columns into zeros, a few at a time since copies take memory."""

@@ -24,6 +24,7 @@ from scipy import special
 
 from ..arrays import quietly
 from ..estimate import Problem, Solution
+from ..programs import on_cores
 from . import settings
 from .products import conditional
 from .view import Parts, View
@@ -114,7 +115,7 @@ def gain(before: Float[np.ndarray, " n"], after: Float[np.ndarray, " n"]) -> Gai
 
 def one_step_ahead(view: View) -> Float[np.ndarray, " m"]:
     """`Predicted.one_step` of a view's vehicle under the view's disturbance."""
-    parts = view.products(view.base, view.disturbance, settings.BLOCKS_ONE_STEP)
+    parts = view.products(view.own, view.disturbance, settings.BLOCKS_ONE_STEP)
     # what lies beyond the end of a short run has nothing
     there = view.measured_by_part(settings.BLOCKS_ONE_STEP) > 0
     parts = Parts(*(own[there] for own in parts))
@@ -204,12 +205,17 @@ def _left(others: Float[np.ndarray, "q q"], block: Float[np.ndarray, "q q"]) -> 
 
 def _simulation_products(fit: Solution, blocks: int) -> Float[np.ndarray, "r b q q"]:
     """Products by block of simulation errors over σ and their derivatives by free numbers and the initial state."""
-    runs, model = fit.runs, fit.model.whole
-    weight = (np.asarray(runs.mask) / np.asarray(fit.sigma))[..., None]
-    parts = (model.error[..., None], model.theta, model.start)
-    samples = 1 + np.asarray(runs.live).sum(axis=1)
-    columns = np.concatenate([np.asarray(part) for part in parts], axis=-1) * weight
-    return np.stack([_by_block(run[:count], blocks) for run, count in zip(columns, samples, strict=True)])
+
+    def of(number: int) -> np.ndarray:
+        runs, model = fit.model.share(number)
+        weight = (np.asarray(runs.mask) / np.asarray(fit.sigma))[..., None]
+        columns = np.concatenate([np.asarray(a) for a in (model.error[..., None], model.theta, model.start)], axis=-1)
+        samples = 1 + np.asarray(runs.live).sum(axis=1)
+        every = zip(columns * weight, samples, strict=True)
+        return np.stack([_by_block(run[:count], blocks) for run, count in every])
+
+    parts = on_cores(of, [(number,) for number in range(len(fit.model.shares))])
+    return np.concatenate(parts)[: len(fit.start)]
 
 
 def _by_block(columns: Float[np.ndarray, "k c q"], blocks: int) -> Float[np.ndarray, "b q q"]:

@@ -24,18 +24,16 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import block_diag
 
-from ..arrays import aligned_zeros
 from ..estimate import estimate_disturbance
-from ..likelihood import Columns, Disturbance, System, padded_width, run_products, with_constants
-from ..programs import on_cores
+from ..likelihood import Columns, Disturbance, by_share, padded_width, run_products, shares, with_constants
 from . import settings
 from .columns import EffectColumns, columns_of
 from .innovation_search import root_or_one
 from .products import Products, conditional
 from .view import View
 
-# samples of a share of the runs, and bytes that columns may take which are kept from one pass to the next
-_SAMPLES, _MEMORY = 4096, 2**30
+# bytes that columns may take which are kept from one pass to the next
+_MEMORY = 2**30
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,14 +95,15 @@ class Evidence:
 
         at = [1 + number for number in self.varied]
         few = padded_width(len(prior)) if at else 0
+        kept = dict(zip((some.start for some in shares(*system.measured.shape[:2])), self.shares, strict=False))
 
-        def of(number: int, runs: slice) -> tuple[np.ndarray, np.ndarray, float]:
-            columns = self.shares[number] if self.shares else _placed(self.view, self.columns, runs)
+        def of(runs: slice) -> tuple[np.ndarray, np.ndarray, float]:
+            columns = kept[runs.start] if kept else self.columns.placed(runs)
             found, own, log_determinant = run_products(disturbance, system.share(runs), columns, few)
             by_run = np.asarray(own)[:, at, : len(unit)]
             return np.asarray(found)[: len(unit), : len(unit)], by_run, float(log_determinant)
 
-        grams, by_run, log_determinants = zip(*on_cores(of, [*enumerate(_shares(system))]), strict=True)
+        grams, by_run, log_determinants = zip(*by_share(of, *system.measured.shape[:2]), strict=True)
         gram = sum(grams) / np.outer(unit, unit)
         gram[: len(prior), : len(prior)] += prior
         # the last share may have empty runs
@@ -119,7 +118,8 @@ class Evidence:
         """
         inside, fixed = products.within(chosen)
         own = self.within(chosen, products)
-        parts = own.view.products(own.view.base + own.picked(fixed), products.disturbance)
+        unit = np.concatenate([np.ones(len(own.view.prior)), own.length[list(fixed)]])
+        parts = own.view.products(own.columns.picked(fixed).placed, products.disturbance).of(unit)
         return conditional(inside.with_priors(fixed), parts)
 
     def within(self, chosen: Sequence[int], products: Products) -> "Evidence":
@@ -187,38 +187,13 @@ def most_columns() -> int:
     return 2 * settings.MOST_EFFECTS
 
 
-def _shares(system: System) -> list[slice]:
-    """Shares of the runs, alike in size, that are filtered one after the other or side by side on cores."""
-    runs, samples = system.measured.shape[:2]
-    count = -(-runs // max(1, _SAMPLES // samples))
-    size = -(-runs // count)
-    return [slice(first, first + size) for first in range(0, runs, size)]
-
-
 def _kept(view: View, columns: EffectColumns) -> tuple[Columns, ...]:
     """The shares' columns; none where they would take much memory, and are made each time."""
     system = view.followed.system
     rows = sum(M.shape[0] * M.shape[1] * M.shape[2] for M in (system.C, system.A))
     width = padded_width(len(view.prior) + len(columns))
-    return tuple(_placed(view, columns, runs) for runs in _shares(system)) if 8 * rows * width < _MEMORY else ()
-
-
-def _placed(view: View, candidates: EffectColumns, runs: slice) -> Columns:
-    """A view's own columns and those of candidates in a share of the runs, padded to the width of a program.
-
-    They are placed where programs take them from, copied once. A share with fewer runs than the others has empty ones.
-    """
-    known, size = len(view.prior), runs.stop - runs.start
-
-    def beside(own: np.ndarray) -> np.ndarray:
-        whole = aligned_zeros((size, *own.shape[1:3], padded_width(known + len(candidates))))
-        whole[: len(own[runs]), ..., :known] = own[runs]
-        return whole
-
-    made = jax.tree.map(beside, view.base)
-    there = len(view.base.shown[runs])
-    candidates.write(jax.tree.map(lambda M: M[:there, ..., known : known + len(candidates)], made), runs)
-    return jax.tree.map(jax.device_put, made)
+    every = shares(*system.measured.shape[:2])
+    return tuple(columns.placed(runs) for runs in every) if 8 * rows * width < _MEMORY else ()
 
 
 def evidence_of(view: View) -> float:

@@ -87,7 +87,7 @@ def shares(view: View, scan: Scan) -> dict[str, float]:
 
 
 def _likelihood(view: View, disturbance: Disturbance) -> float:
-    parts, spreads = view.products(view.base, disturbance)
+    parts, spreads = view.products(view.own, disturbance)
     gram = np.sum(parts, axis=0) + view.prior
     squares = gram[0, 0] - gram[1:, 0] @ np.linalg.solve(gram[1:, 1:], gram[1:, 0])
     return -0.5 * float(squares) - float(np.sum(spreads))

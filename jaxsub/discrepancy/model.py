@@ -125,7 +125,7 @@ def without_variation(view: View, effect: RunVariation) -> View:
 
 def restricted_log_likelihood(view: View) -> float:
     """The log restricted likelihood of a view's disturbance, free parameters integrated out."""
-    parts = view.products(view.base, view.disturbance)
+    parts = view.products(view.own, view.disturbance)
     return integrated(parts.products.sum(axis=0) + view.prior) - float(parts.log_determinants.sum())
 
 

@@ -177,8 +177,9 @@ class _Weighed:
         found = []
         for products in self.products:
             own = evidence.within(self.held, products)
-            whole = own.view.base + own.picked(range(len(own.columns)))
-            found.append(self._predicted(products, own.view.products(whole, products.disturbance)))
+            unit = np.concatenate([np.ones(len(own.view.prior)), own.length])
+            parts = own.view.products(own.columns.placed, products.disturbance).of(unit)
+            found.append(self._predicted(products, parts))
         with_it, without = zip(*found, strict=True)
         return max(with_it) > max(without)
 

@@ -1,7 +1,7 @@
 """A fitted model linearised about its filtered trajectory: what all evidence is computed from."""
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import jax
@@ -16,13 +16,16 @@ from ..likelihood import (
     Disturbance,
     FilteredRuns,
     Linearised,
+    Response,
     System,
     first_guess,
     part_length,
     part_products,
+    response,
+    share_of,
     smoothed,
 )
-from ..programs import compiled
+from ..programs import compiled, on_cores
 from ..recording.runs import Runs
 from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle, numbers_that_may_vary, quantities_of
@@ -43,6 +46,11 @@ class Parts(NamedTuple):
 
     products: Float[np.ndarray, "m q q"]
     log_determinants: Float[np.ndarray, " m"]
+
+    def of(self, length: Float[np.ndarray, " n"]) -> "Parts":
+        """Those of the first n columns, each divided by its `length`."""
+        count = len(length)
+        return self._replace(products=self.products[:, :count, :count] / np.outer(length, length))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,10 +82,17 @@ class View:
         """Whether the filter passed over all of the recordings without divergence."""
         return bool(np.all(np.isfinite(self.covariance)))
 
-    def products(self, columns: Columns, disturbance: Disturbance, pieces: int | None = None) -> Parts:
-        """Products of `columns` whitened under a disturbance, in parts of the recordings.
+    def own(self, some: slice) -> Columns:
+        """The residual's column and those of the free parameters in a share of the runs."""
+        return share_of(self.base, some)
 
-        Every run is cut into so many `pieces`, or so that there are at least four parts.
+    def products(
+        self, columns: Callable[[slice], Columns], disturbance: Disturbance, pieces: int | None = None
+    ) -> Parts:
+        """Products of columns whitened under a disturbance, in parts of the recordings.
+
+        `columns` gives those of a share of the runs. Every run is cut into so many `pieces`, or so that there are at
+        least four parts.
         """
         system = self.followed.system
         pieces = pieces or max(1, -(-settings.BLOCKS // len(system.measured)))
@@ -115,7 +130,7 @@ def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVe
     problem, rms = with_wide_priors(fit.problem), fit.rms
     much = max(rms.values()) > settings.LARGE_ERROR
     search = InnovationSearch(problem, problem.guess if much else _trusted(fit))
-    guess = dataclasses.replace(_guessed(fit.model.whole, fit.runs, fit.sigma, problem.start_std), noise=_white(fit))
+    guess = dataclasses.replace(guessed(fit), noise=_white(fit))
     vehicles = [fit.vehicle, *([near] if much and near is not None else [])]
     best = lambda pairs: by_cost(search.evaluate(*pair) for pair in pairs)[0]
     if disturbance is not None:
@@ -182,10 +197,19 @@ def _doubting(guess: Disturbance, rms: Float[np.ndarray, " c"]) -> tuple[Disturb
     return every, [dataclasses.replace(guess, noise=noise) for noise in alone]
 
 
-@compiled
-def _guessed(model: Linearised, runs: Runs, sigma: Array, start_std: Array) -> Disturbance:
+@quietly
+def guessed(fit: Solution) -> Disturbance:
     """The first guess of the disturbance, by the residuals of a fit."""
-    return first_guess(System.of(model, runs, sigma, start_std), model.error / sigma)
+
+    def of(number: int) -> Response:
+        return jax.device_get(_response(*fit.model.share(number), fit.sigma, fit.problem.start_std))
+
+    return first_guess(on_cores(of, [(number,) for number in range(len(fit.model.shares))]), len(fit.sigma))
+
+
+@compiled
+def _response(runs: Runs, model: Linearised, sigma: Array, start_std: Array) -> Response:
+    return response(System.of(model, runs, sigma, start_std), model.error / sigma)
 
 
 def _white(fit: Solution) -> np.ndarray:
@@ -206,7 +230,7 @@ def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndar
 
 def _left(view: View) -> Columns:
     """The innovations less their projection on the free parameters."""
-    gram = np.sum(view.products(view.base, view.disturbance).products, axis=0) + view.prior
+    gram = np.sum(view.products(view.own, view.disturbance).products, axis=0) + view.prior
     weights = np.array([1.0, *-np.linalg.solve(gram[1:, 1:], gram[1:, 0])])
     return jax.tree.map(lambda column: (column @ weights)[..., None], view.base)
 

@@ -5,7 +5,7 @@ from .batches import batch, side_by_side
 from .between_runs import RunValues
 from .combined import Chain, Global
 from .dead_reckoning import Outage, Track, kinematic_filter, model_filter, tracks_of
-from .disturbance import estimate_disturbance
+from .disturbance import estimate_disturbance, estimate_disturbance_at_once
 from .filtered import Filtered
 from .fitting import AbstractSearchEnd, SearchEnd, Solution, channel_noise, channel_rms, evaluate, fit, search
 from .initial_states import initial_guess, rest, state_channels
@@ -53,6 +53,7 @@ __all__ = [
     "ekf",
     "ends",
     "estimate_disturbance",
+    "estimate_disturbance_at_once",
     "evaluate",
     "fit",
     "gauss_newton",

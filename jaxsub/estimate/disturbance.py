@@ -9,7 +9,9 @@ quasi-Newton search needs a hundred.
 """
 
 import dataclasses
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from types import ModuleType
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -18,10 +20,16 @@ import optimistix as optx
 from jaxtyping import Array, Float
 
 from ..arrays import Values, namespace, quietly
-from ..likelihood import Averages, Columns, Disturbance, System, covariance_derivatives, restricted, total_products
-from ..programs import compiled
-from .damped import Damped
+from ..likelihood import Averages, Columns, Disturbance, System, covariance_derivatives, restricted, shares
+from ..likelihood.disturbance import steps
+from ..likelihood.innovation_products import Begun, Steps, innovation_products, products_adjoint, products_and_begun
+from ..programs import compiled, on_cores
+from .damped import Damped, State
 from .problem import Expansion
+
+R = TypeVar("R")
+# calls a function with the number of each part of the recordings and with the part itself
+_Over = Callable[[Callable[[int, Averages], R]], list[R]]
 
 # more than any search takes: what ends one is that nothing is left to gain
 _STEPS = 50
@@ -40,10 +48,12 @@ _FARTHEST = 2.0
 _SIDE_BY_SIDE = 16
 
 
-class _Given(NamedTuple):
-    parts: tuple[Averages, ...]
-    prior: Array
-    centre: Values
+class _Prior(NamedTuple):
+    """Products of the columns (q, q); the disturbance at the centre; and the logarithm that its times stay below."""
+
+    products: Float[Values, "q q"]
+    centre: Disturbance
+    slowest: Float[Values, ""]
 
 
 @quietly
@@ -61,24 +71,97 @@ def estimate_disturbance(
     `restricted`. `averages` of the same columns, of runs too long to be filtered sample by sample, are fitted beside
     them. Priors hold it loosely to the `start`, and its time constants below half the longest run. The search ends
     where less is left to gain than a `share` of what was gained, which serves one of several in alternation.
+
+    Many runs are passed over in shares. Not to be called in `jit`.
     """
+    parts, products = _padded(system, columns, prior, averages)
+    many = [(part, some) for part in parts for some in shares(*part.columns.shown.shape[:2])]
+    if len(many) == len(parts):
+        return _searched(parts, products, start, np.asarray(share))
+
+    def over(function: Callable[[int, Averages], R]) -> list[R]:
+        own = lambda number, part, some: jax.device_get(function(number, part.share(some)))
+        return on_cores(own, [(number, *one) for number, one in enumerate(many)])
+
+    known = _Prior(products, start, _slowest(parts, np))
+    y = jax.device_put(np.asarray(_logarithms(start)))
+    new = _expand(over, known, y)
+    state = _solver(lambda *_: new, share).begin(y, new)
+    for _ in range(_STEPS):
+        y, state, done = _step(y, state, new, np.asarray(share))
+        if done:
+            break
+        new = _expand(over, known, state.trial)
+    return Disturbance(*np.split(np.exp(y), [start.force.size, 2 * start.force.size]))
+
+
+def estimate_disturbance_at_once(
+    system: System,
+    columns: Columns,
+    prior: Float[Values, "p1 p1"],
+    start: Disturbance,
+    *averages: Averages,
+) -> Disturbance:
+    """`estimate_disturbance` of all runs at once, also in `jit`, in memory that grows with their number.
+
+    Of `system`, `columns`, `prior`, `start` and `averages` as there.
+    """
+    parts, products = _padded(system, columns, prior, averages)
+    return _searched(parts, products, start, np.zeros(()))
+
+
+def _padded(
+    system: System, columns: Columns, prior: Float[Values, "p1 p1"], averages: Sequence[Averages]
+) -> tuple[tuple[Averages, ...], Float[Values, "q q"]]:
+    """All parts of the recordings and the columns' prior, padded to a width that models of several sizes share."""
     known = len(prior)
     whole = -(-known // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
     xp = namespace(prior)
     filled = xp.pad(prior, (0, whole - known)) + xp.diag(np.repeat([0.0, 1.0], [known, whole - known]))
     # samples are means of one each
-    one = xp.ones(())
-    parts = [dataclasses.replace(part, columns=part.columns.padded(whole)) for part in averages]
-    given = _Given((Averages(system, columns.padded(whole), one, one), *parts), filled, _logarithms(start))
-    return _search(given, start, xp.asarray(share))
+    parts = (Averages(system, columns, np.ones(()), np.ones(())), *averages)
+    return tuple(dataclasses.replace(part, columns=part.columns.padded(whole)) for part in parts), filled
 
 
 @compiled
-def _search(given: _Given, begin: Disturbance, share: Values) -> Disturbance:
-    """Where scoring from `begin` ends."""
-    solver = Damped(_expand, _ENOUGH, longest=_FARTHEST, share=share, first=_DAMPED)
-    end = optx.minimise(_cost, solver, jnp.asarray(_logarithms(begin)), given, max_steps=_STEPS, throw=False)
-    return _parts(given, end.value)
+def _searched(parts: tuple[Averages, ...], prior: Values, start: Disturbance, share: Values) -> Disturbance:
+    """Where scoring from the priors' centre ends, all of the recordings taken at once."""
+    known = _Prior(prior, start, _slowest(parts, jnp))
+    expand = lambda parts, y: _expand(lambda of: [of(*one) for one in enumerate(parts)], known, y)
+    cost = lambda y, parts: expand(parts, y).cost
+    y = jnp.asarray(_logarithms(start))
+    end = optx.minimise(cost, _solver(expand, share), y, parts, max_steps=_STEPS, throw=False)
+    return _split(end.value, start.force.size)
+
+
+def _solver(expand: Callable[..., Expansion], share: Values | float) -> Damped:
+    return Damped(expand, _ENOUGH, longest=_FARTHEST, share=share, first=_DAMPED)
+
+
+def _slowest(parts: Sequence[Averages], xp: ModuleType) -> Float[Values, ""]:
+    durations = [xp.max(xp.sum(xp.asarray(part.system.intervals), axis=-1)) for part in parts]
+    return xp.asarray(xp.log(_SLOWEST * xp.max(xp.stack(durations))))
+
+
+@compiled
+def _step(y: Array, state: State, new: Expansion, share: Values) -> tuple[Array, State, Array]:
+    """Where the search goes on from the `new` expansion at its trial, and whether it has ended."""
+    solver = _solver(lambda *_: new, share)
+    y, state, _ = solver.step(None, y, None, {}, state, frozenset())
+    return y, state, solver.terminate(None, y, None, {}, state, frozenset())[0]
+
+
+def _expand(over: _Over, prior: _Prior, y: Array) -> Expansion:
+    """The cost to second order, with the average information for its curvature: sums over parts of the recordings."""
+    grams, log_determinants, begun = zip(*over(lambda number, part: _forth(y, part)), strict=True)
+    cost, slope = _cost(y, prior, _total(grams), _total(log_determinants))
+    back = over(lambda number, part: _back(y, part, begun[number], slope))
+    gradient, gram = map(_total, zip(*back, strict=True))
+    return _expanded(y, prior, cost, gradient, gram)
+
+
+def _total(parts: Sequence[Values]) -> Values:
+    return namespace(*parts).asarray(sum(parts[1:], start=parts[0]))
 
 
 def _logarithms(disturbance: Disturbance) -> Values:
@@ -86,62 +169,70 @@ def _logarithms(disturbance: Disturbance) -> Values:
     return xp.log(xp.concatenate([disturbance.force, disturbance.time, disturbance.noise]))
 
 
-def _parts(given: _Given, y: Array) -> Disturbance:
-    n = given.parts[0].system.G.shape[3] // 2
+def _split(y: Array, n: int) -> Disturbance:
     return Disturbance(*jnp.split(jnp.exp(y), [n, 2 * n]))
 
 
-def _unlikely(y: Array, given: _Given) -> tuple[Array, Array]:
+def _at(y: Array, part: Averages) -> Disturbance:
+    """The disturbance between the samples of a part."""
+    return part.resampled(_split(y, part.system.G.shape[3] // 2))
+
+
+@compiled
+def _forth(y: Array, part: Averages) -> tuple[Array, Array, Begun]:
+    """Products of the whitened columns of a share, half the log-determinant, and what the adjoint needs of them."""
+    (gram, log_determinant), begun = products_and_begun(*steps(_at(y, part), part.system, part.columns))
+    return gram, log_determinant, begun
+
+
+@compiled
+def _back(y: Array, part: Averages, begun: Begun, slope: Float[Array, "q q"]) -> tuple[Array, Float[Array, "e e"]]:
+    """A share's part of the gradient by y, and products of its columns with $V_iPe$ beside them.
+
+    `slope` is the cost's derivative by the products of all shares.
+    """
+
+    def posed(y: Array, residual: Array) -> tuple[Steps, Array]:
+        shown = jnp.asarray(part.columns.shown).at[..., 0].set(residual)
+        return steps(_at(y, part), part.system, Columns(shown, part.columns.forcing))
+
+    (at, _), pull = jax.vjp(posed, y, jnp.asarray(part.columns.shown)[..., 0])
+    gradient, error = pull(products_adjoint(at, begun, slope, jnp.ones(())))
+    more = _derivatives(y, part, error)
+    return gradient, innovation_products(*steps(_at(y, part), part.system, part.columns + more))[0]
+
+
+def _derivatives(y: Array, part: Averages, error: Array) -> Columns:
+    """The columns $V_iPe$, of Pe the `error`."""
+    own = lambda y: _logarithms(_at(y, part))
+    by = covariance_derivatives(_at(y, part), part.system, error) @ jax.jacfwd(own)(y)
+    forcing = part.columns.forcing
+    return Columns(by, None if forcing is None else jnp.zeros((*forcing.shape[:-1], y.size), y.dtype))
+
+
+def _unlikely(y: Array, prior: _Prior) -> tuple[Array, Array]:
     """What the priors cost, and the diagonal of its curvature."""
-    system = given.parts[0].system
-    n, c = system.G.shape[3] // 2, system.C.shape[2]
-    each = lambda *values: jnp.repeat(jnp.asarray(values), jnp.asarray([n, n, c]), total_repeat_length=2 * n + c)
-    longest = jnp.max(jnp.stack([jnp.max(jnp.sum(part.system.intervals, axis=-1)) for part in given.parts]))
-    over = jnp.maximum(y - each(jnp.inf, jnp.log(_SLOWEST * longest), jnp.inf), 0.0) / _EDGE
-    away = (y - given.centre) / each(*_LOOSE)
+    sizes = [prior.centre.force.size, prior.centre.time.size, prior.centre.noise.size]
+    each = lambda *values: jnp.repeat(jnp.asarray(values), np.asarray(sizes), total_repeat_length=sum(sizes))
+    over = jnp.maximum(y - each(jnp.inf, prior.slowest, jnp.inf), 0.0) / _EDGE
+    away = (y - _logarithms(prior.centre)) / each(*_LOOSE)
     return 0.5 * jnp.sum(away**2 + over**2), each(*_LOOSE) ** -2.0 + (over > 0.0) * _EDGE**-2.0
 
 
 @compiled
-def _cost(y: Array, given: _Given) -> Array:
-    return restricted(*_products(y, given)) + _unlikely(y, given)[0]
-
-
-def _products(y: Array, given: _Given) -> tuple[Array, Array]:
-    """Products of the whitened columns of all parts, the priors' included, and half the log-determinant."""
-    disturbance = _parts(given, y)
-    found = [total_products(part.resampled(disturbance), part.system, part.columns) for part in given.parts]
-    grams, spreads = zip(*found, strict=True)
-    return sum(grams, given.prior), sum(spreads, jnp.zeros(()))
+def _cost(y: Array, prior: _Prior, gram: Values, log_determinant: Values) -> tuple[Array, Float[Array, "q q"]]:
+    """The cost by the sums over all shares, and its derivative by the products."""
+    of = lambda gram: restricted(gram + prior.products, jnp.asarray(log_determinant))
+    cost, slope = jax.value_and_grad(of)(jnp.asarray(gram))
+    return cost + _unlikely(y, prior)[0], slope
 
 
 @compiled
-def _expand(given: _Given, y: Array) -> Expansion:
-    """The cost to second order, with the average information for its curvature."""
-
-    def of(y: Array, residuals: list[Array]) -> Array:
-        return _cost(y, given._replace(parts=tuple(map(_with_residual, given.parts, residuals))))
-
-    residuals = [jnp.asarray(part.columns.shown)[..., 0] for part in given.parts]
-    cost, (gradient, errors) = jax.value_and_grad(of, argnums=(0, 1))(y, residuals)
-    parts = tuple(_with_derivatives(given, y, part, error) for part, error in zip(given.parts, errors, strict=True))
-    bordered = jax.scipy.linalg.block_diag(given.prior, jnp.zeros((y.size, y.size), y.dtype))
-    gram, _ = _products(y, given._replace(parts=parts, prior=bordered))
-    known = len(given.prior)
+def _expanded(y: Array, prior: _Prior, cost: Array, gradient: Values, gram: Float[Values, "e e"]) -> Expansion:
+    """The cost to second order, by the sums over shares of `_back`."""
+    known = len(prior.products)
+    gram = gram + jax.scipy.linalg.block_diag(prior.products, jnp.zeros((y.size, y.size), y.dtype))
     fitted, across, own = gram[1:known, 1:known], gram[1:known, known:], gram[known:, known:]
     information = 0.5 * (own - across.T @ jnp.linalg.solve(fitted, across))
-    return Expansion(cost, gradient, information + jnp.diag(_unlikely(y, given)[1]))
-
-
-def _with_residual(part: Averages, residual: Array) -> Averages:
-    shown = jnp.asarray(part.columns.shown).at[..., 0].set(residual)
-    return dataclasses.replace(part, columns=Columns(shown, part.columns.forcing))
-
-
-def _with_derivatives(given: _Given, y: Array, part: Averages, error: Array) -> Averages:
-    """With columns $V_iPe$ beside the others, of Pe the `error`."""
-    own = lambda y: _logarithms(part.resampled(_parts(given, y)))
-    by = covariance_derivatives(part.resampled(_parts(given, y)), part.system, error) @ jax.jacfwd(own)(y)
-    forcing = part.columns.forcing
-    unforced = None if forcing is None else jnp.zeros((*forcing.shape[:-1], y.size), y.dtype)
-    return dataclasses.replace(part, columns=part.columns + Columns(by, unforced))
+    slope = jax.grad(lambda y: _unlikely(y, prior)[0])(y)
+    return Expansion(cost, gradient + slope, information + jnp.diag(_unlikely(y, prior)[1]))

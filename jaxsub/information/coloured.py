@@ -14,14 +14,17 @@ Initial states are eliminated; priors count as observations of their own precisi
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from ..arrays import quietly
 from ..estimate import Problem, Solution
-from ..likelihood import Disturbance, Linearised, System
+from ..likelihood import Disturbance, Linearised, System, by_share, share_of
 from ..likelihood.blocks import Watch, nobody
 from ..likelihood.disturbance import Adjoint, carried_back, carried_to_start
+from ..likelihood.run_shares import Progress
 from ..programs import compiled
 from ..recording.runs import Runs
 from .residual_disturbance import Directions, residual_disturbance, whitened_columns
@@ -46,6 +49,7 @@ class Coloured(eqx.Module):
         return dict(zip(self.names, np.sqrt(np.diag(np.asarray(self.covariance))).tolist(), strict=True))
 
 
+@quietly
 def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, watch: Watch = nobody) -> Coloured:
     """The covariance of the coefficients of `fit` that allows for coloured residuals. NaN where the search failed.
 
@@ -56,11 +60,20 @@ def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, w
     reduced = _reduced(problem, model.products, np.asarray(fit.pressed) != 0.0)
     if disturbance is None:
         disturbance = residual_disturbance(problem, model, reduced.directions, lambda share: watch(0.5 * share))
-    adjoint = Adjoint.at_end(len(problem.guess), len(problem.start_std), len(disturbance.force), len(fit.names))
-    for index in reversed(range(len(model))):
-        adjoint = _back(problem, *model[index], reduced, disturbance, adjoint)
-        watch(1.0 - 0.5 * index / len(model))
-    return Coloured(_sandwich(reduced, disturbance, adjoint), disturbance, fit.names)
+    told = Progress(model.shares, lambda share: watch(0.5 + 0.5 * share))
+
+    def of(some: slice) -> np.ndarray:
+        size = some.stop - some.start
+        number, gain = some.start // size, share_of(reduced.gain, some)
+        adjoint = Adjoint.at_end(size, len(problem.start_std), len(disturbance.force), len(fit.names))
+        for index in reversed(range(model.blocks)):
+            block = model.block(number, index)
+            adjoint = _back(problem, *block, reduced._replace(gain=gain), disturbance, adjoint)
+            told.of(some)(1.0 - index / model.blocks)
+        return np.asarray(_to_start(disturbance, adjoint))
+
+    carried = np.sum(by_share(of, *problem.runs.times.shape), axis=0)
+    return Coloured(jax.device_put(_sandwich(reduced, carried)), disturbance, fit.names)
 
 
 class _Reduced(NamedTuple):
@@ -117,12 +130,13 @@ def _back(
     return carried_back(disturbance, system, left, after)
 
 
-@compiled
-def _sandwich(reduced: _Reduced, disturbance: Disturbance, adjoint: Adjoint) -> Float[Array, "p p"]:
+_to_start = compiled(carried_to_start)
+
+
+def _sandwich(reduced: _Reduced, carried: Float[np.ndarray, "p p"]) -> Float[np.ndarray, "p p"]:
     """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
-    basis, untold = reduced.directions.basis, reduced.untold
-    middle = basis.T @ (carried_to_start(disturbance, adjoint) + reduced.pinned) @ basis
-    return basis @ middle @ basis.T + untold @ untold.T
+    basis, untold, pinned = map(np.asarray, (reduced.directions.basis, reduced.untold, reduced.pinned))
+    return basis @ (basis.T @ (carried + pinned) @ basis) @ basis.T + untold @ untold.T
 
 
 def _directions(information: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array, "p p"]]:

@@ -150,13 +150,14 @@ def _triangle(problem: Problem, model: BlockLinearised, watch: Watch) -> Float[n
     states is another block.
     """
     p, s = len(problem.prior_mean), len(problem.start_std)
-    left = np.zeros((len(problem.runs.times), 0, s + p))
-    for index in range(len(model)):
-        left = _upper(np.concatenate([left, _block_triangle(problem, *model[index])], axis=1))
-        watch((index + 1) / len(model))
-    prior = np.broadcast_to(np.eye(s, s + p), (len(left), s, s + p))
-    rows = _upper(np.concatenate([prior, left], axis=1))[:, s:, s:].reshape(-1, p)
-    return _upper(np.concatenate([rows, np.diag(1.0 / np.asarray(problem.prior_std))]))
+    left, size = [], model.shares[0].stop
+    for number in range(len(model.shares)):
+        own = np.broadcast_to(np.eye(s, s + p), (size, s, s + p))
+        for index in range(model.blocks):
+            own = _upper(np.concatenate([own, _block_triangle(problem, *model.block(number, index))], axis=1))
+            watch((number + (index + 1) / model.blocks) / len(model.shares))
+        left.append(own[:, s:, s:].reshape(-1, p))
+    return _upper(np.concatenate([*left, np.diag(1.0 / np.asarray(problem.prior_std))]))
 
 
 def _upper(matrix: Float[np.ndarray, "*r n q"]) -> Float[np.ndarray, "*r m q"]:

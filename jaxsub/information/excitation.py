@@ -1,6 +1,7 @@
 """What each coefficient multiplies, and which actuators move it: the ground for advice on the next recording."""
 
 import dataclasses
+import itertools
 
 import jax
 import jax.numpy as jnp
@@ -70,9 +71,10 @@ class Excitation:
 def _moments(fit: Solution) -> tuple[Float[np.ndarray, " z"], Float[np.ndarray, " z"]]:
     """Mean and standard deviation of each state and signal, over all samples."""
     count, mean, squares = 0, np.zeros(()), np.zeros(())
-    for index in range(len(fit.model)):
-        runs, model = fit.model[index]
-        at = np.concatenate([np.asarray(model.states), np.asarray(runs.signals)], axis=-1)
+    model = fit.model
+    for number, index in itertools.product(range(len(model.shares)), range(model.blocks)):
+        runs, along = model.block(number, index)
+        at = np.concatenate([np.asarray(along.states), np.asarray(runs.signals)], axis=-1)
         # a block's last sample is the next one's first, and what is padded does not count
         at = at[:, :-1][np.asarray(runs.live)]
         # joined with those before as by Chan, Golub and LeVeque (1983), Am. Statist. 37

@@ -6,6 +6,8 @@ the whole run: for white residuals of 24 000 samples it made standard errors up 
 """
 
 import dataclasses
+import itertools
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax
@@ -13,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ..estimate import Problem, estimate_disturbance
+from ..arrays import Values
+from ..estimate import Problem, estimate_disturbance_at_once
 from ..likelihood import (
     Averages,
     BlockLinearised,
@@ -24,8 +27,9 @@ from ..likelihood import (
     first_guess,
     group_means,
     padded_width,
+    response,
 )
-from ..likelihood.blocks import Watch
+from ..likelihood.blocks import Watch, is_short
 from ..programs import compiled
 from ..recording.runs import Runs
 
@@ -61,47 +65,60 @@ def _estimated(
     problem: Problem, runs: Runs, model: Linearised, directions: Directions, *averages: Averages
 ) -> Disturbance:
     system, shown = _residual_and_columns(problem, runs, model, directions)
-    start = first_guess(system, shown[..., 0])
+    guess = lambda system, shown: first_guess([response(system, jnp.asarray(shown)[..., 0])], system.C.shape[2])
+    start = guess(system, shown)
     for part in averages:
-        slow = first_guess(part.system, jnp.asarray(part.columns.shown[..., 0]))
+        slow = guess(part.system, part.columns.shown)
         # of whole runs: midway between one sample, not one group, and the run
         start = Disturbance(slow.force, slow.time * jnp.sqrt(part.interval / part.duration), start.noise)
-    return estimate_disturbance(system, Columns(shown), directions.prior, start, *averages)
+    return estimate_disturbance_at_once(system, Columns(shown), directions.prior, start, *averages)
 
 
 def _windows(model: BlockLinearised) -> tuple[Runs, Linearised]:
-    """All of it where that is one block, else windows of `_LENGTH` samples from where blocks begin."""
-    if model.only is not None:
-        return model.runs, model.only
+    """All of short runs, else windows of `_LENGTH` samples, evenly spread."""
     count, samples = model.runs.times.shape
+    if is_short(model.runs):
+        runs, parts = zip(*(model.share(number) for number in range(len(model.shares))), strict=True)
+        # with what fills the last share up, which counts for nothing
+        return _beside(runs), jax.tree.map(_end_to_end, *parts)
     length, layout = min(samples, _LENGTH), model.vehicle.layout
     carried = (len(layout.states) + len(layout.equations)) * padded_width(1 + len(layout.free))
     windows = min(_WINDOWS, max(1, _CARRIED // (length * carried)))
     chosen = _spread(count, windows)
-    latest = (samples - length) // model.length
-    firsts = _spread(latest + 1, max(1, windows // len(chosen)))
-    parts = [model.window(first, chosen, length) for first in firsts.tolist()]
+    begins = _spread(samples - length + 1, max(1, windows // len(chosen)))
+    every = itertools.product(begins.tolist(), chosen.tolist())
+    runs, parts = zip(*(model.window(run, begin, length) for begin, run in every), strict=True)
+    return _beside(runs), jax.tree.map(_end_to_end, *parts)
+
+
+def _end_to_end(*parts: Values) -> Values:
+    return parts[0] if len(parts) == 1 else jax.device_put(np.concatenate(parts))
+
+
+def _beside(parts: Sequence[Runs]) -> Runs:
+    """The runs of all `parts` as one batch."""
     arrays = ("times", "step_of", "live", "signals", "outputs", "mask")
-    whole = lambda *pieces: jnp.asarray(np.concatenate(pieces))
-    runs = dataclasses.replace(
-        parts[0][0], **{name: whole(*(getattr(part, name) for part, _ in parts)) for name in arrays}
+    return dataclasses.replace(
+        parts[0], **{name: _end_to_end(*(getattr(part, name) for part in parts)) for name in arrays}
     )
-    return runs, jax.tree.map(whole, *(linearised for _, linearised in parts))
 
 
 def _averages(problem: Problem, model: BlockLinearised, directions: Directions, watch: Watch) -> Averages:
     """Means over groups of samples, about as many as a window has samples, at least one in a block."""
-    count = len(model)
-    chosen = _spread(len(model.runs.times), max(1, _LENGTH // count))
-    groups = max(1, _LENGTH // (count * len(chosen)))
-    means = []
-    for index in range(count):
-        runs, linearised = model[index]
-        linearised = jax.tree.map(lambda leaf: leaf[chosen], linearised)
-        found = _means(problem, runs.take(chosen.tolist(), len(chosen)), linearised, directions, groups)
-        means.append(jax.device_get(found))
-        watch((index + 1) / count)
-    return Averages.joined(means, int(model.runs.live[chosen].sum()))
+    chosen = _spread(len(model.runs.times), max(1, _LENGTH // model.blocks))
+    groups = max(1, _LENGTH // (model.blocks * len(chosen)))
+    means = [[] for _ in range(model.blocks)]
+    for number, some in enumerate(model.shares):
+        inside = [run - some.start for run in chosen.tolist() if some.start <= run < some.stop]
+        for index in range(model.blocks) if inside else ():
+            runs, linearised = model.block(number, index)
+            for run in inside:
+                own = jax.tree.map(lambda leaf, run=run: np.asarray(leaf)[run : run + 1], linearised)
+                means[index].append(jax.device_get(_means(problem, runs.take([run], 1), own, directions, groups)))
+            watch((number + (index + 1) / model.blocks) / len(model.shares))
+    beside = lambda *arrays: np.concatenate(arrays) if np.ndim(arrays[0]) > 1 else arrays[0]
+    joined = [jax.tree.map(beside, *own) for own in means]
+    return Averages.joined(joined, int(model.runs.live[chosen].sum()))
 
 
 @compiled

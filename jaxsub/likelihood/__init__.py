@@ -9,7 +9,6 @@ from .disturbance import (
     System,
     carried,
     covariance_derivatives,
-    first_guess,
     padded_width,
     part_products,
     restricted,
@@ -17,10 +16,12 @@ from .disturbance import (
     total_products,
     whitened,
 )
+from .initial_disturbance import Response, first_guess, response
 from .innovation_products import part_length
 from .innovations import FilteredRuns, filter_runs
 from .open_loop import open_loop_errors
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
+from .run_shares import by_share, joined, share_of, shares
 from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise_runs, propagate
 
 __all__ = [
@@ -31,7 +32,9 @@ __all__ = [
     "FilteredRuns",
     "Jacobians",
     "Linearised",
+    "Response",
     "System",
+    "by_share",
     "carried",
     "concentrated_sigma",
     "covariance_derivatives",
@@ -41,6 +44,7 @@ __all__ = [
     "force_columns",
     "group_means",
     "jacobians",
+    "joined",
     "linearise_runs",
     "negative_log_likelihood",
     "open_loop_errors",
@@ -50,8 +54,11 @@ __all__ = [
     "part_products",
     "propagate",
     "residual_outputs",
+    "response",
     "restricted",
     "run_products",
+    "share_of",
+    "shares",
     "smoothed",
     "total_products",
     "whitened",

@@ -21,6 +21,7 @@ from jaxtyping import Array, Float
 from ..arrays import Values
 from ..programs import compiled
 from .disturbance import Columns, Disturbance, System
+from .run_shares import share_of
 from .sensitivity import propagate
 
 
@@ -52,6 +53,11 @@ class Averages(eqx.Module):
         whole = float(np.sum(between["intervals"]))
         interval, duration = whole / samples, whole / int(np.sum(between["intervals"] > 0.0))
         return cls(system, Columns(jnp.asarray(ends(shown))), jnp.asarray(interval), jnp.asarray(duration))
+
+    def share(self, runs: slice) -> "Averages":
+        """Some of the runs, and beyond the last one such in which nothing is measured. Not to be called in `jit`."""
+        system, columns = self.system.share(runs), share_of(self.columns, runs)
+        return Averages(system, columns, self.interval, self.duration)
 
     def resampled(self, disturbance: Disturbance) -> Disturbance:
         r"""The `disturbance` given at the ends of groups that is as intense at frequency zero.

@@ -1,5 +1,7 @@
 """A model linearised along long runs one block of samples at a time, so that memory does not grow with their length.
 
+Of many runs it is a share at a time, side by side on cores.
+
 The first pass sums what sums are enough for, and leaves a checkpoint where each block begins; whatever is asked later,
 in any order, is worked out again from there.
 """
@@ -10,14 +12,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
+from ..arrays import Values
 from ..effects import AbstractActuator, AbstractInstrument
 from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import measure, sampled_states
 from ..vehicle import AbstractVehicle
 from .output_error import first_turns, wrapped_errors
+from .run_shares import Progress, by_share, joined, share_of, shares
 from .sensitivity import Checkpoint, Jacobians, Linearised, along, with_jacobians
 
 # samples of all runs together up to which one block has all; and in a block of longer runs, where 500 to 8000 take as
@@ -32,15 +36,23 @@ def nobody(share: float) -> None:
     """Tell nobody."""
 
 
+def is_short(runs: Runs) -> bool:
+    """Whether the model linearised along all of `runs` takes little memory."""
+    return runs.times.size <= _SHORT
+
+
 def block_length(vehicle: AbstractVehicle, runs: Runs) -> int:
-    """Intervals in a block: all of them in short runs, and where actuators or sensors need the samples before."""
+    """Intervals in a block of a share: all of them in short runs, and where actuators or sensors need those before."""
     count, samples = runs.times.shape
     whole = any(isinstance(effect, AbstractActuator | AbstractInstrument) for effect in vehicle.effects)
-    return samples - 1 if whole or count * samples <= _SHORT else max(1, _AT_ONCE // count)
+    return samples - 1 if whole or is_short(runs) else max(1, _AT_ONCE // count)
 
 
 class BlockLinearised(eqx.Module):
-    """A model linearised along R runs of K samples, in B blocks of samples that begin at checkpoints.
+    """A model linearised along R runs of K samples, in shares of the runs, and these in blocks of samples.
+
+    A block of a share is linearised again whenever it is asked for, from the checkpoint where it begins; those of short
+    runs are kept.
 
     **Fields**
 
@@ -48,7 +60,7 @@ class BlockLinearised(eqx.Module):
     - `products`: (R, q, q) of each run's whitened columns: by the p free parameters, by its initial state in its
       `start_std`, and the error.
     - `error`: (R, K, c) measured minus modelled, SI, zero where missing.
-    - `begins`: the B checkpoints. `only`: the linearised model where there is one block.
+    - `begins`: the checkpoints of each share's blocks. `kept`: the linearised model of each share of short runs.
     - `length`: intervals in a block.
     """
 
@@ -58,8 +70,8 @@ class BlockLinearised(eqx.Module):
     start_std: Float[Array, " s"]
     products: Float[Array, "r q q"]
     error: Float[Array, "r k c"]
-    begins: tuple[Checkpoint, ...]
-    only: Linearised | None
+    begins: tuple[tuple[Checkpoint, ...], ...]
+    kept: tuple[Linearised, ...]
     length: int = eqx.field(static=True)
 
     @classmethod
@@ -77,51 +89,66 @@ class BlockLinearised(eqx.Module):
         `sigma` (c,) is the noise of the channels and `start_std` (s,) the prior deviation of initial states, both SI.
         `watch` is called with the share of the samples that is done.
         """
-        length, begins, errors, summed, only = block_length(vehicle, runs), [], [], [], None
-        for at, model, products in _passed(vehicle, runs, start, sigma, start_std, watch):
-            begins.append(at)
-            summed.append(products)
-            errors.append(model.error)
-            only = model if length >= runs.times.shape[1] - 1 else None
-        return cls(
-            vehicle,
-            runs,
-            sigma,
-            start_std,
-            jax.device_put(np.sum(summed, axis=0)),
-            _joined(errors, runs.times.shape[1], length),
-            tuple(begins),
-            only,
-            length,
-        )
+        told, samples = Progress(_shares(runs), watch), runs.times.shape[1]
+        length, short = block_length(vehicle, runs.share(_shares(runs)[0])), is_short(runs)
 
-    def __len__(self) -> int:
-        """The number of blocks."""
-        return len(self.begins)
+        def of(some: slice) -> tuple[tuple[Checkpoint, ...], tuple[Linearised, ...], np.ndarray, Array]:
+            begins, errors, summed, kept = [], [], [], ()
+            own = runs.share(some)
+            for at, model, products in _passed(vehicle, own, share_of(start, some), sigma, start_std, told.of(some)):
+                begins.append(at)
+                summed.append(products)
+                errors.append(model.error)
+                kept = (model,) if short else ()
+            return tuple(begins), kept, np.sum(summed, axis=0), _joined(errors, samples, length)
 
-    def __getitem__(self, index: int) -> tuple[Runs, Linearised]:
-        """The runs of a block, and the model linearised along them."""
-        if self.only is not None:
-            return self.runs, self.only
-        block = _cut(self.runs, jnp.asarray(range(len(self))[index] * self.length), self.length)
-        return block, _block(self.vehicle, block, self.begins[index], self.sigma, self.start_std)[0]
-
-    def window(self, first: int, chosen: Int[np.ndarray, " m"], samples: int) -> tuple[Runs, Linearised]:
-        """`samples` samples of the runs numbered `chosen`, from where the block numbered `first` begins."""
-        runs = _cut(self.runs, jnp.asarray(first * self.length), samples - 1).take(chosen.tolist(), len(chosen))
-        last = min(len(self), first + -(-(samples - 1) // self.length))
-        models = [jax.tree.map(lambda leaf: leaf[chosen], self[index][1]) for index in range(first, last)]
-        return runs, self._joined(models, samples)
+        begins, kept, products, errors = zip(*by_share(of, *runs.times.shape), strict=True)
+        products, error = joined([*zip(products, errors, strict=True)], len(start))
+        return cls(vehicle, runs, sigma, start_std, products, error, begins, sum(kept, ()), length)
 
     @property
-    def whole(self) -> Linearised:
-        """The model linearised along all samples at once, in memory that grows with their number."""
-        if self.only is not None:
-            return self.only
-        return self._joined([self[index][1] for index in range(len(self))], self.runs.times.shape[1])
+    def shares(self) -> list[slice]:
+        """The runs of each share."""
+        return _shares(self.runs)
 
-    def _joined(self, models: list[Linearised], samples: int) -> Linearised:
+    @property
+    def blocks(self) -> int:
+        """How many blocks each share has."""
+        return len(self.begins[0])
+
+    def block(self, number: int, index: int) -> tuple[Runs, Linearised]:
+        """The runs of the block `index` of the share `number`, and the model linearised along them."""
+        own = self.runs.share(self.shares[number])
+        if self.kept:
+            return own, self.kept[number]
+        if self.blocks > 1:
+            own = _cut(own, jnp.asarray(index * self.length), self.length)
+        return own, _block(self.vehicle, own, self.begins[number][index], self.sigma, self.start_std)[0]
+
+    def share(self, number: int) -> tuple[Runs, Linearised]:
+        """The runs of the share `number`, and the model linearised along them, in memory that grows with these."""
+        models = [self.block(number, index)[1] for index in range(self.blocks)]
+        return self.runs.share(self.shares[number]), self._whole(models, self.runs.times.shape[1])
+
+    def window(self, run: int, begin: int, samples: int) -> tuple[Runs, Linearised]:
+        """`samples` samples of one `run`, from that numbered `begin` on, and the model linearised along them."""
+        number, own = divmod(run, self.shares[0].stop)
+        first, last = begin // self.length, -(-(begin + samples - 1) // self.length)
+        models = [self.block(number, index)[1] for index in range(first, min(last, self.blocks))]
+        # by NumPy: to cut arrays of JAX would be a program for each place
+        models = [jax.tree.map(lambda leaf: np.asarray(leaf)[own : own + 1], model) for model in models]
+        before = begin - first * self.length
+        whole = self._whole(models, min(before + samples, self.runs.times.shape[1] - first * self.length))
+        cut = lambda leaf: leaf[:, before:]
+        runs = _cut(self.runs.take([run], 1), jnp.asarray(begin), samples - 1)
+        return runs, jax.tree.map(cut, whole)
+
+    def _whole(self, models: list[Linearised], samples: int) -> Linearised:
         return jax.tree.map(lambda *parts: _joined(list(parts), samples, self.length), *models)
+
+
+def _shares(runs: Runs) -> list[slice]:
+    return shares(*runs.times.shape)
 
 
 def summed_products(
@@ -133,8 +160,14 @@ def summed_products(
     watch: Watch = nobody,
 ) -> Float[Array, "r q q"]:
     """The `products` of `BlockLinearised` alone."""
-    passed = _passed(vehicle, runs, start, sigma, start_std, watch)
-    return jax.device_put(np.sum([products for _, _, products in passed], axis=0))
+    told = Progress(_shares(runs), watch)
+
+    def of(some: slice) -> np.ndarray:
+        own, begin = runs.share(some), share_of(start, some)
+        passed = _passed(vehicle, own, begin, sigma, start_std, told.of(some))
+        return np.sum([products for _, _, products in passed], axis=0)
+
+    return jnp.asarray(joined(by_share(of, *runs.times.shape), len(start)))
 
 
 def _passed(
@@ -153,12 +186,17 @@ def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s
 
     `start` (R, s) are the initial states, SI. Long runs are taken in blocks. Not to be called in `jit`.
     """
-    length, errors, state = block_length(vehicle, runs), [], start
-    turns = jax.device_put(np.full((len(start), len(vehicle.layout.channels)), np.nan, start.dtype))
-    for block in _blocks(runs, length, nobody):
-        error, state, turns = _errors(vehicle, block, state, turns)
-        errors.append(error)
-    return _joined(errors, runs.times.shape[1], length)
+
+    def of(some: slice) -> Array:
+        own, state = runs.share(some), share_of(start, some)
+        length, errors = block_length(vehicle, own), []
+        turns = jax.device_put(np.full((len(state), len(vehicle.layout.channels)), np.nan, start.dtype))
+        for block in _blocks(own, length, nobody):
+            error, state, turns = _errors(vehicle, block, state, turns)
+            errors.append(error)
+        return _joined(errors, runs.times.shape[1], length)
+
+    return joined(by_share(of, *runs.times.shape), len(start))
 
 
 def _block(
@@ -213,11 +251,11 @@ def _blocks(runs: Runs, length: int, watch: Watch) -> Iterator[Runs]:
 _cut = compiled(Runs.block)
 
 
-def _joined(parts: list[Array], samples: int, length: int) -> Array:
+def _joined(parts: list[Values], samples: int, length: int) -> Array:
     """Blocks of samples, or of intervals, as one array; the sample that ends a block is that which begins the next."""
     ends = parts[0].shape[1] - length
     if len(parts) == 1:
-        return parts[0][:, : samples - 1 + ends]
+        return jnp.asarray(parts[0][:, : samples - 1 + ends])
     whole = np.empty((len(parts[0]), samples - 1 + ends, *parts[0].shape[2:]), parts[0].dtype)
     for index, part in enumerate(parts):
         at = whole[:, index * length : (index + 1) * length + ends]

@@ -12,6 +12,7 @@ Thompson 1971), which a Kalman filter of [x, d] gives: coefficients that are fit
 the disturbance, and the restricted likelihood allows for that.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -25,6 +26,7 @@ from ..arrays import Values, namespace
 from ..programs import compiled
 from ..recording.runs import Runs
 from .innovation_products import Steps, beyond, innovation_products, passes, products_by_part
+from .run_shares import by_share, share_of
 from .sensitivity import Jacobians, Linearised, propagate
 
 # columns from which their number is padded to a multiple of so many
@@ -77,16 +79,12 @@ class System(eqx.Module):
 
     def share(self, runs: slice) -> "System":
         """Some of the runs, and beyond the last one such in which nothing is measured. Not to be called in `jit`."""
-        size = runs.stop - runs.start
-        if size == len(self.intervals):
-            return self
+        return System(*share_of(self.by_run, runs), self.start_std)
 
-        def some(M: Array) -> Array:
-            found = np.asarray(M)[runs]
-            return jax.device_put(np.pad(found, [(0, size - len(found)), *[(0, 0)] * (found.ndim - 1)]))
-
-        A, G, C, measured, intervals = map(some, (self.A, self.G, self.C, self.measured, self.intervals))
-        return System(A, G, C, measured, intervals, self.start_std)
+    @property
+    def by_run(self) -> tuple[Array, Array, Array, Array, Array]:
+        """What each run has of its own, in the order of the fields."""
+        return self.A, self.G, self.C, self.measured, self.intervals
 
 
 class Columns(eqx.Module):
@@ -116,22 +114,6 @@ class Columns(eqx.Module):
         return jax.tree.map(pad, self)
 
 
-@compiled
-def first_guess(system: System, residual: Float[Array, "r k c"]) -> Disturbance:
-    """A disturbance to start from: in each equation a force whose lasting effect is as large as the residual.
-
-    `system` is the linearised model, and `residual` (R, K, c) is in σ.
-    """
-    n, r = system.G.shape[3] // 2, len(system.intervals)
-    steady = system.G[..., :n] + system.G[..., n:]
-    response = system.C @ propagate(system.A, steady, jnp.zeros((r, system.A.shape[-1], n)))
-    effect = jnp.sqrt(jnp.sum(response**2, (0, 1, 2)))
-    length = jnp.max(jnp.sum(system.intervals, axis=1))
-    slow = length / jnp.sqrt(jnp.max(jnp.sum(system.intervals > 0.0, axis=1)))
-    force = jnp.sqrt(jnp.sum(residual**2)) / jnp.where(effect > 0.0, effect, 1.0)
-    return Disturbance(force, jnp.full(n, slow), jnp.ones(residual.shape[2]))
-
-
 def restricted(gram: Float[Array, "q q"], log_determinant: Float[Array, ""]) -> Float[Array, ""]:
     """Minus the logarithm of the restricted likelihood, up to its constant.
 
@@ -155,16 +137,23 @@ def whitened(
 
 
 def part_products(
-    disturbance: Disturbance, system: System, columns: Columns, parts: int
+    disturbance: Disturbance, system: System, columns: Callable[[slice], Columns], parts: int
 ) -> tuple[Float[np.ndarray, "r m q q"], Float[np.ndarray, "r m"]]:
     """Products of all `columns` whitened, in each of `parts` of every run; half the log-determinant of each part.
 
-    The innovations are those of `system` under `disturbance`. Columns are padded to one of a few widths, so that one
-    program serves many numbers of them. Not to be called in `jit`.
+    The innovations are those of `system` under `disturbance`. `columns` gives those of a share of the runs. They are
+    padded to one of a few widths, so that one program serves many numbers of them. Not to be called in `jit`.
     """
-    count = columns.shown.shape[-1]
-    found, spreads = _part_products(disturbance, system, columns.padded(padded_width(count)), parts)
-    return np.asarray(found)[..., :count, :count], np.asarray(spreads)
+
+    def of(some: slice) -> tuple[np.ndarray, np.ndarray]:
+        own = columns(some)
+        count = own.shown.shape[-1]
+        found, spreads = _part_products(disturbance, system.share(some), own.padded(padded_width(count)), parts)
+        return np.asarray(found)[..., :count, :count], np.asarray(spreads)
+
+    runs, samples = system.measured.shape[:2]
+    found, spreads = (np.concatenate(own)[:runs] for own in zip(*by_share(of, runs, samples), strict=True))
+    return found, spreads
 
 
 @compiled

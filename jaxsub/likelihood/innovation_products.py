@@ -173,19 +173,27 @@ def _sample(run: Steps, k: Array) -> Steps:
 @jax.custom_vjp
 def innovation_products(steps: Steps, begin: Float[Array, "z z"]) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
     """Products of the whitened innovations of all columns, and half the log-determinant of their covariance."""
-    return _forth(steps, begin)[0]
+    return products_and_begun(steps, begin)[0]
 
 
-def _forth(steps: Steps, begin: Array) -> tuple[tuple[Array, Array], tuple[Steps, tuple[Array, Array]]]:
+# covariance (R, B, z, z) and means (R, B, z, q) where each of the B pieces of a run begins
+Begun = tuple[Array, Array]
+
+
+def products_and_begun(steps: Steps, begin: Float[Array, "z z"]) -> tuple[tuple[Array, Array], Begun]:
+    """`innovation_products`, and what `products_adjoint` needs beside the steps."""
     gram, log_determinant, begun = _filtered(steps, begin, 1)
-    first = jax.tree.map(lambda M: M[:, 0], begun)
-    return (jnp.sum(gram, (0, 1)), jnp.sum(log_determinant)), (steps, first)
+    return (jnp.sum(gram, (0, 1)), jnp.sum(log_determinant)), jax.tree.map(lambda M: M[:, 0], begun)
 
 
-def _back(kept: tuple[Steps, tuple[Array, Array]], given: tuple[Array, Array]) -> tuple[Steps, Array]:
-    """The adjoint, piece by piece from the last: what a piece met is worked out again from where it begins."""
-    steps, begun = kept
-    both, log_determinant = given[0] + given[0].T, given[1]
+def products_adjoint(
+    steps: Steps, begun: Begun, by_gram: Float[Array, "q q"], by_log_determinant: Float[Array, ""]
+) -> tuple[Steps, Float[Array, "z z"]]:
+    """Derivatives by the steps and by the covariance at the start, from those by both of `innovation_products`.
+
+    Piece by piece from the last: what a piece met is worked out again from where it begins.
+    """
+    both, log_determinant = by_gram + by_gram.T, by_log_determinant
     samples, (z, q) = steps.noise.shape[1], begun[1].shape[-2:]
     pieces, length = _cut(samples, 1)
 
@@ -253,4 +261,9 @@ def _back_step(
     return (lever, weight), Steps(of_F, of_B, of_C, jnp.diagonal(of_S), of_E, of_forcing)
 
 
-innovation_products.defvjp(_forth, _back)
+def _forth(steps: Steps, begin: Array) -> tuple[tuple[Array, Array], tuple[Steps, Begun]]:
+    found, begun = products_and_begun(steps, begin)
+    return found, (steps, begun)
+
+
+innovation_products.defvjp(_forth, lambda kept, given: products_adjoint(*kept, *given))

@@ -13,6 +13,7 @@ Source: Åström (1980), Automatica 16, prediction errors.
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.scipy.linalg import cho_solve
 from jaxtyping import Array, Float
 
@@ -23,6 +24,7 @@ from ..simulation import Sampled
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import wrapped
 from .disturbance import Columns, Disturbance, System, augmented, padded_width, total_products
+from .run_shares import by_share, joined, share_of
 from .sensitivity import Jacobians, jacobians
 
 
@@ -63,11 +65,29 @@ def filter_runs(
     Both are SI. `sigma` (c,) is the noise of the channels, SI, in whose units the columns are, and `disturbance` that
     of the forces.
     """
+
+    def of(some: slice) -> FilteredRuns:
+        return _filtered_share(vehicle, runs.share(some), sigma, disturbance, share_of(start, some), start_std)
+
+    parts = by_share(of, *runs.times.shape)
+    own = [(p.expected, p.filtered, p.force, p.system.by_run, p.residual, p.theta) for p in parts]
+    expected, filtered, force, system, residual, theta = joined(own, len(start))
+    products = jax.device_put(sum(np.asarray(p.products) for p in parts))
+    log_determinant = jax.device_put(sum(np.asarray(p.log_determinant) for p in parts))
+    system = System(*system, start_std)
+    return FilteredRuns(expected, filtered, force, system, residual, theta, products, log_determinant)
+
+
+def _filtered_share(
+    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, start_std: Array
+) -> FilteredRuns:
+    """`filter_runs` of a share of the runs, at once."""
     expected, filtered, force, push = _path(vehicle, runs, sigma, disturbance, start, start_std)
     by = jacobians(vehicle, runs, filtered, expected, push)
     system, residual, theta, whole = _columns(vehicle.turning, runs, sigma, start_std, expected, filtered, push, by)
-    products, logarithm = total_products(disturbance, system, whole)
-    return FilteredRuns(expected, filtered, force, system, residual, theta, products, logarithm)
+    # waited for, so that no more shares than cores are in memory
+    products, log_determinant = jax.block_until_ready(total_products(disturbance, system, whole))
+    return FilteredRuns(expected, filtered, force, system, residual, theta, products, log_determinant)
 
 
 @compiled

@@ -77,8 +77,16 @@ class Runs(eqx.Module):
         arrays = ("times", "step_of", "live", "signals", "outputs", "mask")
         # by NumPy, for which no program has to be made
         taken = {name: np.asarray(getattr(self, name))[index] for name in arrays}
-        taken["mask"] &= np.arange(size)[:, None, None] < len(chosen)
+        there = np.arange(size) < len(chosen)
+        taken["mask"] &= there[:, None, None]
+        # a copy that nothing corrects could diverge
+        taken["live"] &= there[:, None]
         return dataclasses.replace(self, **jax.device_put(taken))
+
+    def share(self, some: slice) -> "Runs":
+        """Some of the runs, and beyond the last one copies that count for nothing."""
+        size, count = some.stop - some.start, len(self.times)
+        return self if size == count else self.take(range(some.start, min(some.stop, count)), size)
 
     def segments(self, count: int) -> "Runs":
         """Every run cut into `count` pieces of equal length, each a run of its own that starts where the last ended.

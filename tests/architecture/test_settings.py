@@ -46,7 +46,7 @@ ALLOWED = {
         "separation.py": {"_PENALTY", "_MARGIN", "_SHARP", "_NONE", "_UNTOLD"},
     },
     "is the version of a file": {"stored.py": {"_SCHEMA"}},
-    "is a limit of the process": {"evidence.py": {"_SAMPLES", "_MEMORY"}, "programs.py": {"_MANY"}},
+    "is a limit of the process": {"evidence.py": {"_MEMORY"}, "programs.py": {"_MANY"}},
     "is what is said where nothing was tested": {"verdict.py": {"NOTHING"}, "whiteness.py": {"RANDOM"}},
 }  # fmt: skip
 # modules whose numbers come after the verdict: none that decides may import them

@@ -119,7 +119,7 @@ def test_a_block_of_a_simulation_has_the_errors_of_a_fit_to_the_others():
     """Claim: it equals the squared errors after least squares on the other blocks, the initial states following."""
     whole = fitted()
     found = simulated(whole, 4)
-    model, weight = whole.model.whole, np.asarray(whole.runs.mask) / np.asarray(whole.sigma)
+    model, weight = whole.model.share(0)[1], np.asarray(whole.runs.mask) / np.asarray(whole.sigma)
     spread = np.asarray(whole.problem.start_std)
     error, theta, start = (np.asarray(part) for part in (model.error, model.theta, model.start))
     theta, start = theta * weight[..., None], start * weight[..., None] * spread
@@ -151,10 +151,10 @@ def test_a_vehicle_that_runs_away_is_predicted_nowhere():
 def test_a_vehicle_that_nearly_runs_away_raises_nothing():
     """Claim: where sums over blocks of sensitivities that are floats are none, no block has a density; no error."""
     whole = fitted()
-    theta = np.asarray(whole.model.whole.theta / whole.sigma[:, None])
+    theta = np.asarray(whole.model.share(0)[1].theta / whole.sigma[:, None])
     # the second run's squares are the largest float's, and those of both runs are beyond it
-    far = whole.model.whole.theta * np.sqrt(1.7e308 / np.sum(theta**2, axis=(1, 2)).max())
-    model = dataclasses.replace(whole.model, only=dataclasses.replace(whole.model.whole, theta=far))
+    far = whole.model.share(0)[1].theta * np.sqrt(1.7e308 / np.sum(theta**2, axis=(1, 2)).max())
+    model = dataclasses.replace(whole.model, kept=(dataclasses.replace(whole.model.share(0)[1], theta=far),))
     found = simulated(dataclasses.replace(whole, model=model), 1)
     assert np.all(np.isneginf(found))
 
@@ -164,7 +164,7 @@ def test_blocks_that_count_are_those_in_which_something_was_measured():
     fit = fitted()
     view = look(dataclasses.replace(fit, runs=fit.runs.padded()))
     counts = view.measured_by_part(24)
-    products, logarithms = view.products(view.base, view.disturbance, 24)
+    products, logarithms = view.products(view.own, view.disturbance, 24)
     assert counts.sum() == int(np.asarray(view.followed.system.measured).sum())
     np.testing.assert_array_equal(counts > 0, (logarithms != 0.0) | np.any(products != 0.0, axis=(1, 2)))
     assert 0 < np.sum(counts == 0) < 24

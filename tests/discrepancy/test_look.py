@@ -43,7 +43,7 @@ def test_a_turn_leads_to_nothing_less_probable(fitted, monkeypatch):
     assert evidence_of(look(fitted, found.disturbance)) > still - 0.5
     # a hundred times too large at first, and a step of ten thousand down: all of it is too far, half is right
     large = dataclasses.replace(found.disturbance, force=100.0 * found.disturbance.force)
-    monkeypatch.setattr(view, "_guessed", lambda *given: large)
+    monkeypatch.setattr(view, "guessed", lambda fit: large)
     monkeypatch.setattr(innovation_search, "estimate_disturbance", led_to(1e-4))
     half = look(fitted)
     assert float(half.disturbance.force[0] / found.disturbance.force[0]) == pytest.approx(1.0, rel=1e-6)
@@ -57,7 +57,7 @@ def test_runs_of_unequal_length_have_a_disturbance(fitted):
     assert evidence_of(same) == pytest.approx(evidence_of(found), rel=1e-6)
     assert np.asarray(same.disturbance.force) == pytest.approx(np.asarray(found.disturbance.force), rel=1e-3)
     # it moved from where it began
-    begun = view._guessed(fitted.model.whole, fitted.runs, fitted.sigma, fitted.problem.start_std)
+    begun = view.guessed(fitted)
     assert np.max(np.abs(np.log(found.disturbance.force / np.asarray(begun.force)))) > 0.1
 
 

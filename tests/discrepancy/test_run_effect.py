@@ -181,7 +181,7 @@ def test_a_fitted_spread_is_tested_against_none_and_blocks_are_predicted_by_the_
     effect = RunVariation("F_x", spread=whole.vehicle.spreads["F_x"])
     assert p_value(view, effect) < 1e-6
     assert restricted_log_likelihood(view) > restricted_log_likelihood(without_variation(view, effect)) + 10.0
-    found, model = simulated(whole, 4), whole.model.whole
+    found, model = simulated(whole, 4), whole.model.share(0)[1]
     spread, at = np.asarray(whole.problem.start_std), 2
     assert whole.vehicle.layout.states[at] == "F_x.deviation"
     e, J, X = (np.asarray(part)[:, :, 0] / SIGMA for part in (model.error, model.theta, model.start))

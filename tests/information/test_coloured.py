@@ -56,11 +56,13 @@ def gauss_markov(rng, count, size, time):
 
 def refitted(fit, force, seed):
     """Coefficient errors and the residuals left, linearly refitted to noise and to the answer to `force` (R, K, q)."""
-    answer = force_columns(fit.model.whole, jnp.asarray(force[:, :-1, None]), jnp.asarray(force[:, 1:, None]))
+    answer = force_columns(fit.model.share(0)[1], jnp.asarray(force[:, :-1, None]), jnp.asarray(force[:, 1:, None]))
     noise = SIGMA[:, None] * np.random.default_rng(seed).standard_normal(answer.shape)
     mask = np.asarray(fit.runs.mask)[..., None]
     data = mask * (np.asarray(answer) + noise) / SIGMA[:, None]
-    theta, start = (mask * np.asarray(a) / SIGMA[:, None] for a in (fit.model.whole.theta, fit.model.whole.start))
+    theta, start = (
+        mask * np.asarray(a) / SIGMA[:, None] for a in (fit.model.share(0)[1].theta, fit.model.share(0)[1].start)
+    )
     p = theta.shape[-1]
     columns = np.zeros((RUNS, SAMPLES, 2, p + 2 * RUNS))
     columns[..., :p] = theta
@@ -74,10 +76,8 @@ def refitted(fit, force, seed):
 
 def coverage(fit, errors, residuals):
     """Shares of nominal 95 % intervals that cover: raw, corrected."""
-    corrected = jax.jit(
-        jax.vmap(lambda e: coloured_covariance(eqx.tree_at(lambda f: f.model.only.error, fit, e)).covariance)
-    )
-    variances = np.diagonal(np.asarray(corrected(jnp.asarray(residuals))), axis1=1, axis2=2)
+    with_error = lambda error: eqx.tree_at(lambda f: f.model.kept[0].error, fit, jnp.asarray(error))
+    variances = np.stack([np.diag(coloured_covariance(with_error(error)).covariance) for error in residuals])
     inside = lambda variance: float(np.mean(np.abs(errors) < 1.96 * np.sqrt(variance)))
     return inside(np.diag(np.asarray(fit.covariance))), inside(variances)
 
@@ -161,8 +161,8 @@ def minus_log(disturbance, system, columns, prior):
 
 def posed(fit, residual):
     """What `estimate_disturbance` takes but for its start, of residuals (R, K, c)."""
-    system = System.of(fit.model.whole, fit.runs, fit.sigma, fit.problem.start_std)
-    shown = np.concatenate([residual[..., None], np.asarray(fit.model.whole.theta)], axis=-1)
+    system = System.of(fit.model.share(0)[1], fit.runs, fit.sigma, fit.problem.start_std)
+    shown = np.concatenate([residual[..., None], np.asarray(fit.model.share(0)[1].theta)], axis=-1)
     weight = np.asarray(fit.runs.mask)[..., None] / SIGMA[:, None]
     return system, Columns(jnp.asarray(shown * weight)), 1e-6 * jnp.eye(shown.shape[-1])
 
