@@ -23,14 +23,14 @@ def diagnose_case(case: Case, folder: Path) -> tuple[Conclusions, dict]:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "vehicle.toml").write_text(case.vehicle, encoding="utf-8")
     shutil.rmtree(folder / "figures", ignore_errors=True)
-    begin = time.perf_counter()
+    begin, spent = time.perf_counter(), time.process_time()
     answer = answered(read_vehicle(folder / "vehicle.toml"), case.train, case.held)
     diagnosis = answer.conclusions
     emit(answer)
     answer.write(folder)
-    seconds = time.perf_counter() - begin
+    times = {"seconds": round(time.perf_counter() - begin, 1), "cpu_seconds": round(time.process_time() - spent, 1)}
     draw_held_out(diagnosis, case, folder / "held_out.png")
-    return diagnosis, {**numbers(diagnosis, case), "seconds": round(seconds, 1), "by_hand": by_hand(case, folder)}
+    return diagnosis, {**numbers(diagnosis, case), **times, "by_hand": by_hand(case, folder)}
 
 
 def numbers(diagnosis: Conclusions, case: Case) -> dict:
