@@ -12,8 +12,8 @@ from ..concealed_physics.plan import Case, cases
 
 FACTORS = (0.5, 2.0)
 # quick ones of several conditions and vehicles, the first two of them with nothing concealed; those of --quick
-CASES = ("none_white-003", "none_coloured-000", "strong-021", "weak-002", "sigma-000", "short-008")
-QUICK = ("none_white-003", "short-008")
+CASES = ("none_white-003", "none_coloured-000", "weak-007", "weak-002", "sigma-000", "short-008")
+QUICK = ("none_white-003", "weak-007")
 _SETTING = re.compile(r"^# (?P<section>[^a-z].+)$\n\n|(?P<meaning>(?:^# .+\n)+)^(?P<name>[A-Z_]+): Final", re.MULTILINE)
 
 Value = int | float | tuple[float, ...]
