@@ -19,8 +19,7 @@ import numpy as np
 from jaxtyping import Array
 from scipy import stats
 
-from jaxsub.discrepancy.process_noise import Above, calibrated, noise_densities, noise_filter
-from jaxsub.discrepancy.settings import LEVEL
+from jaxsub.discrepancy.process_noise import LEVEL, Above, calibrated, noise_densities, noise_filter
 from jaxsub.effects import (
     VELOCITIES,
     AbstractForce,

@@ -38,9 +38,10 @@ from ..recording import Recording
 from ..recording.runs import Runs
 from ..simulation import simulate
 from ..vehicle import AbstractVehicle
-from . import settings
 
 _SEED = 0
+# level of an alarm anywhere in clean runs, of which 19 copies are the fewest that show it
+LEVEL = 0.05
 # constant process noise, sensors' σ per root second: with less the filter's uncertainty is slow to follow, with more it
 # corrects so much at once that a small force drowns in the sensors' noise
 _FLOOR = 0.1
@@ -119,7 +120,7 @@ def noise_note(signals: Sequence[NoiseSignal]) -> list[str]:
     """One line: the equations and times where the filter's process noise rises; none without signals."""
     if not signals:
         return []
-    clean = f"clean runs do so anywhere with probability {settings.LEVEL:g}"
+    clean = f"clean runs do so anywhere with probability {LEVEL:g}"
     risen = [
         f"{equation} ({signal.run}: {', '.join(f'{a:.0f} to {b:.0f} s' for a, b in signal.intervals(equation))})"
         for signal in signals
@@ -146,7 +147,7 @@ def calibrated(
     others = np.maximum((together - copies) / (len(copies) - 1), 1e-300)
     highest = np.sort(np.max(copies / others, axis=(1, 2, 3), where=live[..., None], initial=0.0))
     # were the recording clean, it would be as likely as any copy to be the highest
-    rank = int(np.ceil((1.0 - settings.LEVEL) * (len(copies) + 1) - 1e-9))
+    rank = int(np.ceil((1.0 - LEVEL) * (len(copies) + 1) - 1e-9))
     ratios = _averaged(recorded[None], live)[0] / np.maximum(together / len(copies), 1e-300)
     return np.where(live[..., None], ratios, 0.0), float(highest[rank - 1])
 

@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ..effects import Motion, by_name
-from . import settings
 from .diagnosis import Regime
 from .spline_basis import STILL
 
-_SHIFTS = 199  # of the test by chance
+# of the test by chance, and its level
+_SHIFTS, _LEVEL = 199, 0.05
 # area under the curve from which a variable marks a regime
 _AREA = 0.75
 # share of the samples that must lie inside and outside a regime's intervals
@@ -53,7 +53,7 @@ def regime(variables: Variables, inside: Bool[np.ndarray, "r k"], live: Bool[np.
         return None
     rng = np.random.default_rng(0)
     exceeded = [np.max(np.abs(_areas(ranks, _moved(inside, live, rng)[live]) - 0.5)) >= reached for _ in range(_SHIFTS)]
-    if (1 + np.sum(exceeded)) / (1 + _SHIFTS) > settings.LEVEL:
+    if (1 + np.sum(exceeded)) / (1 + _SHIFTS) > _LEVEL:
         return None
     return _parted(names[best], variables[names[best]][live], inside[live], bool(areas[best] > 0.5))
 

@@ -12,7 +12,7 @@ from typing import Final
 # level at which a candidate, a force (both corrected for all tried) or a fitted amplitude is significant, and at which
 # a model with more predicts better: several are compared in one diagnosis, at two horizons each
 SIGNIFICANCE: Final[float] = 0.01
-# level of one test: that a model predicts worse, of a filter's alarm, of a regime; and of confidence bounds
+# level of one test: that a model predicts worse; and of confidence bounds
 LEVEL: Final[float] = 0.05
 # log Bayes factor from which one explanation is clearly better than another
 CLEAR_LOG_BAYES: Final[float] = 3.0

@@ -34,8 +34,8 @@ ALLOWED = {
     },
     "says where and when a mismatch is, after the verdict": {
         "locate.py": {"_SIGMAS", "_SUPPORTED_SIGMAS", "_GAP", "_VARIABLES", "_SCORE_SHARE", "_LEAST_SCORE"},
-        "process_noise.py": {"_SEED", "_FLOOR", "_RANGE", "_WINDOW", "_START_STD"},
-        "regime.py": {"_SHIFTS", "_AREA", "_SHARE"},
+        "process_noise.py": {"_SEED", "LEVEL", "_FLOOR", "_RANGE", "_WINDOW", "_START_STD"},
+        "regime.py": {"_SHIFTS", "_LEVEL", "_AREA", "_SHARE"},
     },
     "is what a report lists": {
         "consistency.py": {"_LISTED"}, "procedure.py": {"_LISTED", "_LISTED_PROBABILITY", "_REPORTED_DISTURBANCE"},
