@@ -1,134 +1,53 @@
-"""What has no name is described by what free runs ask for, and what was named keeps its numbers."""
+"""What no effect explains is modelled by a smooth force, beside which named effects keep or regain their numbers."""
 
-import dataclasses
-import sys
-from types import SimpleNamespace
-
-import numpy as np
 import pytest
 from diagnosis_cases import recorded, wrong
+from lacking_rig import FITTER, KINDS, SPRING, lacking, models, numbers
 
-from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter
-from jaxsub.discrepancy.cross_validation import Comparison, Gain
+from jaxsub.discrepancy.examine import examine
 from jaxsub.discrepancy.model import fit_with
-from jaxsub.discrepancy.nonparametric import Pattern
-from jaxsub.discrepancy.products import Products
-from jaxsub.discrepancy.selector import Selector
 from jaxsub.discrepancy.surrogate import with_surrogate
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
-from jaxsub.discrepancy.whiteness import RANDOM, Memory
-from jaxsub.effects import SmoothForce
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import QuadraticDamping
 from jaxsub.estimate import batch, fit
 
-NO_GAIN = Gain(0.0, 1.0, 1.0)
+FRICTION, FORCE = "coulomb-friction[x]", "smooth-force[x,x_rate]"
+UNKNOWN = Judged("unknown", [], 1e-9, [])
 
 
-class FreeRun(Products):
-    """Shares of a free run's errors that candidates explain on top of others."""
-
-    def __init__(self, shares):
-        object.__setattr__(self, "shares", shares)
-
-    def explained(self, chosen, owners):
-        return np.array(self.shares[len(chosen)])
-
-
-class Freely(Selector):
-    """What surrogates ask of a selector: shares of a free run's errors on top of others."""
-
-    def __init__(self, candidates, shares, disturbance=None):
-        self.candidates, self.usable = candidates, np.ones(len(candidates), bool)
-        self.owners = [[i] for i in range(len(candidates))]
-        self.free = FreeRun(shares)
-        best = lambda columns: (0.0, SimpleNamespace(disturbance=disturbance))
-        self.evidence = SimpleNamespace(best=best, given=[])
-        self.predicted = lambda chosen, index, under: (candidates[index], True)
+def with_force(effect, *rig):
+    """A model of an oscillator that damping drives, one `effect` accepted, and that model with a smooth force."""
+    named = models(*rig).model(numbers(lacking(*rig)[1], effect))
+    found = examine(named.view, KINDS, lambda message: None)
+    assert found.nonparametric == "x"
+    best, said = with_surrogate(FITTER, named, found, UNKNOWN, KINDS)
+    assert FORCE in [one.label for one in best.added] and (said.verdict, said.named) == ("unknown", [])
+    assert float(best.fit.cost) < 0.1 * float(named.fit.cost)
+    return named, best
 
 
-def seen(selector, memory, pattern=None, disturbance=None):
-    """A last look at recordings, of which only the selector, what is left and a force without a name matter."""
-    found = object.__new__(Examination)
-    naming = SimpleNamespace(products=SimpleNamespace(disturbance=disturbance))
-    parts = {"naming": naming, "pattern": pattern, "memory": memory, "view": None, "selector": selector}
-    for name, value in parts.items():
-        object.__setattr__(found, name, value)
-    return found
+def test_a_named_effect_that_a_smooth_force_hides_keeps_its_numbers():
+    """Claim: friction beside a smooth force of the rate, of which it is nearly a part, is held at what it was."""
+    named, best = with_force(FRICTION, 0.15)
+    values, kept = named.fit.vehicle.values(), best.fit.vehicle.values()
+    own = [name for name in values if name.startswith(FRICTION)]
+    assert own and not set(own) & set(best.fit.names)
+    assert all(float(kept[name]) == float(values[name]) for name in own)
 
 
-@pytest.mark.parametrize(
-    ("most", "worse", "asked", "stands"),
-    [
-        (9.0, 0.0, [8.0], 8.0),
-        (5.0, 0.0, [8.0, 4.0], 4.0),
-        (1.0, 0.0, [8.0, 4.0, 2.0], None),
-        (3.0, 1.0, [8.0, 4.0], None),
-    ],
-)
-def test_a_force_that_overdoes_it_is_tried_by_halves(monkeypatch, most, worse, asked, stands):
-    """Claim: of a force found to be 8 N from zero half and a quarter are tried, and the largest that helps stands.
-
-    Where free runs err more with half of it a quarter is not tried.
-    """
-    force = SmoothForce("surge", "u", -1.0, 1.0, 8.0)
-    pattern = Pattern(force, np.zeros(2), 1.0, 1e-9, True, 0.0, 0.0)
-    found = fit(wrong(), batch(wrong(), recorded(None, 2)[:2]))
-    named = Model(found, look(found), None, ())
-    spreads = []
-
-    def fitted(fitter, model, effects, disturbance):
-        spreads.append(effects[0].spread)
-        return model._replace(predicted=effects[0].spread, added=tuple(effects))
-
-    def gained(before, after, admissible):
-        return Comparison(Gain(1.0, 1e-3 if after < most else 1.0, 0.5), NO_GAIN, 1.0 + worse / after, admissible)
-
-    monkeypatch.setattr(ModelFitter, "with_effects", fitted)
-    path = sys.modules["jaxsub.discrepancy.surrogate"]
-    monkeypatch.setattr(path, "compare", gained)
-    fitter = object.__new__(ModelFitter)
-    left = seen(Freely([], [()]), Memory(1e-9, 1.0), pattern, named.view.disturbance)
-    best, said = with_surrogate(fitter, named, left, Judged("unknown", [], 1e-9, []), None)
-    assert spreads == asked
-    assert [effect.spread for effect in best.added] == ([] if stands is None else [stands])
-    assert (best is named) is (stands is None)
-    assert [force.label in note for note in said.notes] == [True]
-
-
-@pytest.mark.parametrize(("errors", "holds"), [(1.5, False), (3.0, True)])
-def test_what_was_named_keeps_its_numbers_beside_what_hides_them(monkeypatch, errors, holds):
-    """Claim: a named moment is fitted again beside a drag, unless its standard error then grows more than twofold."""
-    effect, drag = HullAsymmetry("pitch", 250.0), QuadraticDamping("surge", -1.0)
-    found = fit(wrong().with_effect(effect), batch(wrong(), recorded(effect, 2)[:2]))
-    named = Model(found, look(found), None, (effect,))
-    own = next(name for name in found.names if name.startswith("hull-asymmetry"))
-    started = []
-
-    def fitted(fitter, model, effects, disturbance):
-        row = next(row for row in model.fit.vehicle.layout.parameters if row.name == own)
-        started.append(row.free)
-        cheaper = dataclasses.replace(found, cost=0.5 * found.cost, covariance=errors**2 * found.covariance)
-        return model._replace(fit=cheaper, added=(*model.added, *effects))
-
-    monkeypatch.setattr(ModelFitter, "with_effects", fitted)
-    path = sys.modules["jaxsub.discrepancy.surrogate"]
-    monkeypatch.setattr(path, "with_coloured_errors", lambda view, fit: fit)
-    monkeypatch.setattr(path, "compare", lambda *given: Comparison(Gain(1.0, 1e-3, 0.999), NO_GAIN, 0.5, True))
-    monkeypatch.setattr(path, "listed", lambda *_: Freely([], [()]))
-    monkeypatch.setattr(path, "weighed", lambda *_: seen(None, RANDOM))
-    selector = Freely([drag], [(0.3,), (0.0,)], named.view.disturbance)
-    fitter = object.__new__(ModelFitter)
-    object.__setattr__(fitter, "progress", lambda message: None)
-    best, _ = with_surrogate(fitter, named, seen(selector, Memory(1e-9, 1.0)), Judged("named", [], 1e-9, []), None)
-    assert best.added == (effect, drag)
-    assert started == [True, False][: 1 + holds]
+def test_a_named_effect_that_a_smooth_force_leaves_identifiable_is_estimated_again():
+    """Claim: a spring beside a smooth force of the rate, unlike which it is, comes nearer to its true 1 N/m³."""
+    named, best = with_force(SPRING, 0.15, 1.0)
+    own = f"{SPRING}.k_3"
+    before, after = (abs(float(one.fit.vehicle.values()[own]) - 1.0) for one in (named, best))
+    assert own in best.fit.names and after < 0.5 * before
 
 
 @pytest.mark.long
 def test_numbers_that_are_held_stay_through_every_search():
-    """Claim: a moment that is held is the same after a fit with a drag more, which begins at the file's numbers too."""
+    """Claim: a moment that is held is the same after a fit with a drag more, which starts at the file's numbers too."""
     runs = batch(wrong(), recorded(HullAsymmetry("pitch", 300.0), 2)[:2])
     vehicle = wrong().with_effect(HullAsymmetry("pitch", 250.0))
     own = next(row.name for row in vehicle.layout.free if row.name.startswith("hull-asymmetry"))
