@@ -43,6 +43,11 @@ def keep_programs(folder: Path | None) -> None:
     _Kept.folder = folder
 
 
+def kept_programs() -> Path | None:
+    """The folder of `keep_programs`."""
+    return _Kept.folder
+
+
 def compiled(function: F) -> F:
     """The function as `equinox.filter_jit` makes it; its programs are kept where `keep_programs` says.
 
@@ -71,6 +76,10 @@ class _Compiled:
             self._calls[key] = _kept(_Kept.folder, self._function, args, kwargs)
         call = self._calls[key]
         return self._jitted(*args, **kwargs) if call is None else call(arrays)
+
+    def __reduce__(self) -> str:
+        # by its name, as any function
+        return self._function.__qualname__
 
     def lower(self, *args: Any, **kwargs: Any) -> Any:
         """The lowered program, as by `equinox.filter_jit`; it is not kept."""

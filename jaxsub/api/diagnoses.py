@@ -23,6 +23,7 @@ from ..recording import Recording, hold_out, load, save
 from ..recording.recording import Recordings
 from ..report.text import measurement, percent, ratio, unit
 from ..vehicle import AbstractVehicle, read_vehicle, vehicle_text, with_coefficients
+from ..workers import working_on
 from .recordings import checked
 from .result import AbstractResult
 from .table import Parts, Table
@@ -43,6 +44,7 @@ def diagnose(
     effects: Sequence[type[AbstractEffect]] | None = None,
     manoeuvre: bool = True,
     budget: float | None = None,
+    cluster: str | None = None,
     progress: Progress = lambda message: None,
 ) -> "Diagnosis":
     """Which physics `vehicle` lacks according to `recordings`: what `jaxsub diagnose` computes.
@@ -51,16 +53,18 @@ def diagnose(
     runs, which are simulated once after the last decision; without them they are the last recording, or the last 30 %
     of a single one. `effects` are the classes that may be named, by default `js.vocabulary()`. Where rivals remain and
     a `manoeuvre` is wanted, inputs that separate them are looked for. After `budget` seconds no further effect is
-    tried, and the answer so far is given. `progress` is called with a line on what is being done.
+    tried, and the answer so far is given. Passes over many runs are work of the Dask workers of `cluster`, the address
+    of a scheduler, or `local` for a worker a core. `progress` is called with a line on what is being done.
 
-    **Raises** `InputError` where nothing is free, for recordings that cannot be used, and where the model does not run
-    from its values or diverges along the recordings.
+    **Raises** `InputError` where nothing is free, for recordings that cannot be used, where the model does not run from
+    its values or diverges along the recordings, and where no scheduler answers at `cluster`.
     """
     require_free(vehicle, vehicle.layout.name)
     runs = checked(vehicle, recordings, held_out or ())
     train, test = (runs.recordings, runs.held_out) if held_out else hold_out(runs.recordings)
     kinds = None if effects is None else tuple(effects)
-    found = diagnosed(vehicle, train, test, kinds, budget=budget, progress=progress)
+    with working_on(cluster):
+        found = diagnosed(vehicle, train, test, kinds, budget=budget, progress=progress)
     return found.with_next_run(train, progress) if manoeuvre else found
 
 

@@ -12,9 +12,10 @@ from ..estimate import require_free
 from ..plain import to_json
 from ..recording import Recording
 from ..recording.recording import Recordings
-from ..sweeps import Plan, Store, answered, check_folder, open_sweep, require_cluster, require_memory, summarised
+from ..sweeps import Plan, Store, answered, check_folder, open_sweep, require_memory, summarised
 from ..sweeps import sweep as run_plan
 from ..vehicle import AbstractVehicle
+from ..workers import require_cluster
 from .recordings import checked
 from .result import AbstractResult
 from .table import Parts, Table

@@ -26,6 +26,9 @@ PUBLISHED = (
 _vehicle = click.argument("vehicle", type=_PATH)
 _runs = click.argument("runs", type=_PATH, nargs=-1, required=True)
 _columns = click.option("--columns", type=_PATH, help="A TOML file that says which channels of a log to take.")
+_cluster = click.option(
+    "--cluster", metavar="ADDRESS", help="A Dask scheduler, or local for one worker a core of this machine."
+)
 _overwrite = click.option("--overwrite", is_flag=True, help="Replace what jaxsub wrote at --out before.")
 
 
@@ -130,6 +133,7 @@ def check(
 @click.option("--budget", metavar="SECONDS", type=click.FloatRange(0.0), help="End with the answer so far after these.")
 @click.option("--begin", type=_PATH, help="improved.toml of an incomplete answer, to go on from.")
 @click.option("--explain", is_flag=True, help="Print every decision: its test, statistic, threshold and outcome.")
+@_cluster
 @_columns
 @_overwrite
 @common
@@ -143,13 +147,14 @@ def diagnose(
     budget: float | None,
     begin: Path | None,
     explain: bool,
+    cluster: str | None,
     columns: Path | None,
     overwrite: bool,
 ) -> None:
     """Fit, locate the mismatch, name the missing physics, model it, and show it on test runs."""
     from . import diagnose as command
 
-    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns, explain, budget, begin)
+    command.run(vehicle, runs, hold_out, out, overwrite, effects, manoeuvre, columns, explain, budget, begin, cluster)
 
 
 @app.command()
@@ -322,7 +327,7 @@ def channels(log: Path, words: tuple[str, ...]) -> None:
 @click.option("--method", type=click.Choice(METHODS), default=METHODS[0], show_default=True)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True, help="Of all draws.")
 @click.option("--compiled", is_flag=True, help="By C made of the model: many times faster; needs .[control] and cc.")
-@click.option("--cluster", metavar="ADDRESS", help="A Dask scheduler, or local for one worker a core of this machine.")
+@_cluster
 @_overwrite
 @common
 def sweep(out: Path, overwrite: bool, **arguments: Any) -> None:

@@ -13,6 +13,7 @@ from ..errors import InputError, OutputError
 from ..estimate import require_free
 from ..recording import Recording, hold_out
 from ..vehicle import AbstractVehicle, added_effects, read_vehicle
+from ..workers import working_on
 from . import session, terminal
 from .options import options
 from .output import Fresh, fresh_folders, paths_of
@@ -31,13 +32,15 @@ def run(
     explain: bool = False,
     budget: float | None = None,
     begin: Path | None = None,
+    cluster: str | None = None,
 ) -> None:
     """Diagnose the recordings at `runs`, shown on the test runs at `held` or on what `hold_out` sets aside.
 
     Effects that the Python file at `script` defines are tried with those that are installed. Of logs the file at
     `columns` says what to take. `explain` prints every decision. After `budget` seconds, or at Ctrl-C, the answer so
     far is given. It is put at `out` after each effect that is accepted, and stays there whatever ends what follows.
-    The vehicle file at `begin` is the improved one of such an answer, from which this one goes on.
+    The vehicle file at `begin` is the improved one of such an answer, from which this one goes on. `cluster` is as of
+    `working_on`.
     """
     session.start()
     with fresh_folders(out, overwrite, paths_of(vehicle_path, *runs, *held, script, columns, begin)) as fresh:
@@ -48,7 +51,8 @@ def run(
         recordings, unseen = load_train_and_test(runs, held, vehicle, columns)
         train, test = (recordings, unseen) if held else hold_out(recordings)
         keep = lambda found: _keep(found, fresh, out)
-        answer = answered(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget, keep, first)
+        with working_on(cluster):
+            answer = answered(vehicle, train, test, (*vocabulary(), *own), manoeuvre, budget, keep, first)
         # shown before it is written: where writing fails, minutes of work are not lost
         emit(answer, explain)
         terminal.warn(answer.warnings)

@@ -12,9 +12,10 @@ from ..errors import InputError, OutputError
 from ..estimate import require_free
 from ..findings import Finding
 from ..storage import Manifest, place
-from ..sweeps import Plan, check_folder, require_cluster, summarised
+from ..sweeps import Plan, check_folder, summarised
 from ..sweeps import sweep as run_sweep
 from ..vehicle import AbstractVehicle, read_vehicle
+from ..workers import require_cluster
 from . import session, terminal
 from .options import options
 from .output import claimed, require_apart, require_replaceable

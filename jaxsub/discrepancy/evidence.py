@@ -25,7 +25,7 @@ from jaxtyping import Float
 from scipy.linalg import block_diag
 
 from ..estimate import estimate_disturbance
-from ..likelihood import Columns, Disturbance, by_share, padded_width, run_products, shares, with_constants
+from ..likelihood import Columns, Disturbance, System, by_share, padded_width, run_products, shares, with_constants
 from . import settings
 from .columns import EffectColumns, columns_of
 from .innovation_search import root_or_one
@@ -97,13 +97,12 @@ class Evidence:
         few = padded_width(len(prior)) if at else 0
         kept = dict(zip((some.start for some in shares(*system.measured.shape[:2])), self.shares, strict=False))
 
-        def of(runs: slice) -> tuple[np.ndarray, np.ndarray, float]:
+        def own(runs: slice) -> tuple[Disturbance, System, Columns, int, list[int], int]:
             columns = kept[runs.start] if kept else self.columns.placed(runs)
-            found, own, log_determinant = run_products(disturbance, system.share(runs), columns, few)
-            by_run = np.asarray(own)[:, at, : len(unit)]
-            return np.asarray(found)[: len(unit), : len(unit)], by_run, float(log_determinant)
+            return disturbance, system.share(runs), columns, few, at, len(unit)
 
-        grams, by_run, log_determinants = zip(*by_share(of, *system.measured.shape[:2]), strict=True)
+        found = by_share(_cut_run_products, own, *system.measured.shape[:2])
+        grams, by_run, log_determinants = zip(*found, strict=True)
         gram = sum(grams) / np.outer(unit, unit)
         gram[: len(prior), : len(prior)] += prior
         # the last share may have empty runs
@@ -185,6 +184,14 @@ def with_smaller(one: Disturbance) -> list[Disturbance]:
 def most_columns() -> int:
     """The columns of effects that one selection takes, for which the disturbance's program has room."""
     return 2 * settings.MOST_EFFECTS
+
+
+def _cut_run_products(
+    disturbance: Disturbance, system: System, columns: Columns, few: int, at: list[int], count: int
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """The products of the first `count` columns, and by run of those `at` which numbers that differ by run are."""
+    found, own, log_determinant = run_products(disturbance, system, columns, few)
+    return np.asarray(found)[:count, :count], np.asarray(own)[:, at, :count], float(log_determinant)
 
 
 def _kept(view: View, columns: EffectColumns) -> tuple[Columns, ...]:

@@ -10,8 +10,9 @@ quasi-Newton search needs a hundred.
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from functools import partial
 from types import ModuleType
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -23,13 +24,14 @@ from ..arrays import Values, namespace, quietly
 from ..likelihood import Averages, Columns, Disturbance, System, covariance_derivatives, restricted, shares
 from ..likelihood.disturbance import steps
 from ..likelihood.innovation_products import Begun, Steps, innovation_products, products_adjoint, products_and_begun
-from ..programs import compiled, on_cores
+from ..programs import compiled
+from ..workers import on_workers
 from .damped import Damped, State
 from .problem import Expansion
 
 R = TypeVar("R")
-# calls a function with the number of each part of the recordings and with the part itself
-_Over = Callable[[Callable[[int, Averages], R]], list[R]]
+# calls a function with each part of the recordings and with what is given beside it by the part's number
+_Over = Callable[[Callable[..., R], Callable[[int], tuple]], list[R]]
 
 # more than any search takes: what ends one is that nothing is left to gain
 _STEPS = 50
@@ -79,9 +81,9 @@ def estimate_disturbance(
     if len(many) == len(parts):
         return _searched(parts, products, start, np.asarray(share))
 
-    def over(function: Callable[[int, Averages], R]) -> list[R]:
-        own = lambda number, part, some: jax.device_get(function(number, part.share(some)))
-        return on_cores(own, [(number, *one) for number, one in enumerate(many)])
+    def over(function: Callable[..., R], beside: Callable[[int], tuple]) -> list[R]:
+        own = lambda number, part, some: (function, part.share(some), *beside(number))
+        return on_workers(_waited, [partial(own, number, *one) for number, one in enumerate(many)])
 
     known = _Prior(products, start, _slowest(parts, np))
     y = jax.device_put(np.asarray(_logarithms(start)))
@@ -93,6 +95,11 @@ def estimate_disturbance(
             break
         new = _expand(over, known, state.trial)
     return Disturbance(*np.split(np.exp(y), [start.force.size, 2 * start.force.size]))
+
+
+def _waited(function: Callable[..., R], *given: Any) -> R:
+    """A function's answer in NumPy, so that no more parts than cores are in memory."""
+    return jax.device_get(function(*given))
 
 
 def estimate_disturbance_at_once(
@@ -127,7 +134,8 @@ def _padded(
 def _searched(parts: tuple[Averages, ...], prior: Values, start: Disturbance, share: Values) -> Disturbance:
     """Where scoring from the priors' centre ends, all of the recordings taken at once."""
     known = _Prior(prior, start, _slowest(parts, jnp))
-    expand = lambda parts, y: _expand(lambda of: [of(*one) for one in enumerate(parts)], known, y)
+    every = lambda parts: lambda function, beside: [function(part, *beside(n)) for n, part in enumerate(parts)]
+    expand = lambda parts, y: _expand(every(parts), known, y)
     cost = lambda y, parts: expand(parts, y).cost
     y = jnp.asarray(_logarithms(start))
     end = optx.minimise(cost, _solver(expand, share), y, parts, max_steps=_STEPS, throw=False)
@@ -153,9 +161,9 @@ def _step(y: Array, state: State, new: Expansion, share: Values) -> tuple[Array,
 
 def _expand(over: _Over, prior: _Prior, y: Array) -> Expansion:
     """The cost to second order, with the average information for its curvature: sums over parts of the recordings."""
-    grams, log_determinants, begun = zip(*over(lambda number, part: _forth(y, part)), strict=True)
+    grams, log_determinants, begun = zip(*over(_forth, lambda number: (y,)), strict=True)
     cost, slope = _cost(y, prior, _total(grams), _total(log_determinants))
-    back = over(lambda number, part: _back(y, part, begun[number], slope))
+    back = over(_back, lambda number: (y, begun[number], slope))
     gradient, gram = map(_total, zip(*back, strict=True))
     return _expanded(y, prior, cost, gradient, gram)
 
@@ -179,14 +187,14 @@ def _at(y: Array, part: Averages) -> Disturbance:
 
 
 @compiled
-def _forth(y: Array, part: Averages) -> tuple[Array, Array, Begun]:
+def _forth(part: Averages, y: Array) -> tuple[Array, Array, Begun]:
     """Products of the whitened columns of a share, half the log-determinant, and what the adjoint needs of them."""
     (gram, log_determinant), begun = products_and_begun(*steps(_at(y, part), part.system, part.columns))
     return gram, log_determinant, begun
 
 
 @compiled
-def _back(y: Array, part: Averages, begun: Begun, slope: Float[Array, "q q"]) -> tuple[Array, Float[Array, "e e"]]:
+def _back(part: Averages, y: Array, begun: Begun, slope: Float[Array, "q q"]) -> tuple[Array, Float[Array, "e e"]]:
     """A share's part of the gradient by y, and products of its columns with $V_iPe$ beside them.
 
     `slope` is the cost's derivative by the products of all shares.

@@ -21,11 +21,11 @@ from jaxtyping import Array, Bool, Float
 
 from ..arrays import quietly
 from ..estimate import Problem, Solution
-from ..likelihood import Disturbance, Linearised, System, by_share, share_of
+from ..likelihood import Disturbance, Linearised, System, share_of
 from ..likelihood.blocks import Watch, nobody
 from ..likelihood.disturbance import Adjoint, carried_back, carried_to_start
 from ..likelihood.run_shares import Progress
-from ..programs import compiled
+from ..programs import compiled, on_cores
 from ..recording.runs import Runs
 from .residual_disturbance import Directions, residual_disturbance, whitened_columns
 
@@ -72,7 +72,7 @@ def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, w
             told.of(some)(1.0 - index / model.blocks)
         return np.asarray(_to_start(disturbance, adjoint))
 
-    carried = np.sum(by_share(of, *problem.runs.times.shape), axis=0)
+    carried = np.sum(on_cores(of, [(some,) for some in model.shares]), axis=0)
     return Coloured(jax.device_put(_sandwich(reduced, carried)), disturbance, fit.names)
 
 

@@ -7,6 +7,7 @@ in any order, is worked out again from there.
 """
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -89,20 +90,12 @@ class BlockLinearised(eqx.Module):
         `sigma` (c,) is the noise of the channels and `start_std` (s,) the prior deviation of initial states, both SI.
         `watch` is called with the share of the samples that is done.
         """
-        told, samples = Progress(_shares(runs), watch), runs.times.shape[1]
+        told = Progress(_shares(runs), watch)
         length, short = block_length(vehicle, runs.share(_shares(runs)[0])), is_short(runs)
 
-        def of(some: slice) -> tuple[tuple[Checkpoint, ...], tuple[Linearised, ...], np.ndarray, Array]:
-            begins, errors, summed, kept = [], [], [], ()
-            own = runs.share(some)
-            for at, model, products in _passed(vehicle, own, share_of(start, some), sigma, start_std, told.of(some)):
-                begins.append(at)
-                summed.append(products)
-                errors.append(model.error)
-                kept = (model,) if short else ()
-            return tuple(begins), kept, np.sum(summed, axis=0), _joined(errors, samples, length)
-
-        begins, kept, products, errors = zip(*by_share(of, *runs.times.shape), strict=True)
+        own = lambda some: (vehicle, runs.share(some), share_of(start, some), sigma, start_std, told.of(some), short)
+        found = by_share(_linearised_share, own, *runs.times.shape)
+        begins, kept, products, errors = zip(*found, strict=True)
         products, error = joined([*zip(products, errors, strict=True)], len(start))
         return cls(vehicle, runs, sigma, start_std, products, error, begins, sum(kept, ()), length)
 
@@ -151,6 +144,20 @@ def _shares(runs: Runs) -> list[slice]:
     return shares(*runs.times.shape)
 
 
+def _linearised_share(
+    vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Array, start_std: Array, watch: Watch, short: bool
+) -> tuple[tuple[Checkpoint, ...], tuple[Linearised, ...], np.ndarray, Array]:
+    """Of a share of the runs where blocks begin, the model where these are `short`, the products and the errors."""
+    begins, errors, summed, kept = [], [], [], ()
+    for at, model, products in _passed(vehicle, runs, start, sigma, start_std, watch):
+        begins.append(at)
+        summed.append(products)
+        errors.append(model.error)
+        kept = (model,) if short else ()
+    error = _joined(errors, runs.times.shape[1], block_length(vehicle, runs))
+    return tuple(begins), kept, np.sum(summed, axis=0), error
+
+
 def summed_products(
     vehicle: AbstractVehicle,
     runs: Runs,
@@ -162,12 +169,13 @@ def summed_products(
     """The `products` of `BlockLinearised` alone."""
     told = Progress(_shares(runs), watch)
 
-    def of(some: slice) -> np.ndarray:
-        own, begin = runs.share(some), share_of(start, some)
-        passed = _passed(vehicle, own, begin, sigma, start_std, told.of(some))
-        return np.sum([products for _, _, products in passed], axis=0)
+    own = lambda some: (vehicle, runs.share(some), share_of(start, some), sigma, start_std, told.of(some))
+    return jnp.asarray(joined(by_share(_summed_share, own, *runs.times.shape), len(start)))
 
-    return jnp.asarray(joined(by_share(of, *runs.times.shape), len(start)))
+
+def _summed_share(*given: Any) -> np.ndarray:
+    """The products of a share of the runs."""
+    return np.sum([products for _, _, products in _passed(*given)], axis=0)
 
 
 def _passed(
@@ -187,16 +195,18 @@ def output_errors(vehicle: AbstractVehicle, runs: Runs, start: Float[Array, "r s
     `start` (R, s) are the initial states, SI. Long runs are taken in blocks. Not to be called in `jit`.
     """
 
-    def of(some: slice) -> Array:
-        own, state = runs.share(some), share_of(start, some)
-        length, errors = block_length(vehicle, own), []
-        turns = jax.device_put(np.full((len(state), len(vehicle.layout.channels)), np.nan, start.dtype))
-        for block in _blocks(own, length, nobody):
-            error, state, turns = _errors(vehicle, block, state, turns)
-            errors.append(error)
-        return _joined(errors, runs.times.shape[1], length)
+    own = lambda some: (vehicle, runs.share(some), share_of(start, some))
+    return joined(by_share(_share_errors, own, *runs.times.shape), len(start))
 
-    return joined(by_share(of, *runs.times.shape), len(start))
+
+def _share_errors(vehicle: AbstractVehicle, runs: Runs, state: Array) -> Array:
+    """The errors of a share of the runs from the initial `state`."""
+    length, errors = block_length(vehicle, runs), []
+    turns = jax.device_put(np.full((len(state), len(vehicle.layout.channels)), np.nan, state.dtype))
+    for block in _blocks(runs, length, nobody):
+        error, state, turns = _errors(vehicle, block, state, turns)
+        errors.append(error)
+    return _joined(errors, runs.times.shape[1], length)
 
 
 def _block(

@@ -145,15 +145,20 @@ def part_products(
     padded to one of a few widths, so that one program serves many numbers of them. Not to be called in `jit`.
     """
 
-    def of(some: slice) -> tuple[np.ndarray, np.ndarray]:
-        own = columns(some)
-        count = own.shown.shape[-1]
-        found, spreads = _part_products(disturbance, system.share(some), own.padded(padded_width(count)), parts)
-        return np.asarray(found)[..., :count, :count], np.asarray(spreads)
-
+    own = lambda some: (disturbance, system.share(some), columns(some), parts)
     runs, samples = system.measured.shape[:2]
-    found, spreads = (np.concatenate(own)[:runs] for own in zip(*by_share(of, runs, samples), strict=True))
-    return found, spreads
+    found = by_share(_cut_part_products, own, runs, samples)
+    products, spreads = (np.concatenate(each)[:runs] for each in zip(*found, strict=True))
+    return products, spreads
+
+
+def _cut_part_products(
+    disturbance: Disturbance, system: System, columns: Columns, parts: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Those of a share of the runs, less what the columns are padded with."""
+    count = columns.shown.shape[-1]
+    found, spreads = _part_products(disturbance, system, columns.padded(padded_width(count)), parts)
+    return np.asarray(found)[..., :count, :count], np.asarray(spreads)
 
 
 @compiled

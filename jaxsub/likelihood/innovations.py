@@ -66,10 +66,8 @@ def filter_runs(
     of the forces.
     """
 
-    def of(some: slice) -> FilteredRuns:
-        return _filtered_share(vehicle, runs.share(some), sigma, disturbance, share_of(start, some), start_std)
-
-    parts = by_share(of, *runs.times.shape)
+    own = lambda some: (vehicle, runs.share(some), sigma, disturbance, share_of(start, some), start_std)
+    parts = by_share(_filtered_share, own, *runs.times.shape)
     own = [(p.expected, p.filtered, p.force, p.system.by_run, p.residual, p.theta) for p in parts]
     expected, filtered, force, system, residual, theta = joined(own, len(start))
     products = jax.device_put(sum(np.asarray(p.products) for p in parts))

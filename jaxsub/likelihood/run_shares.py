@@ -1,9 +1,10 @@
 """Shares of the runs: what is summed over runs is worked out for a few of them at a time, side by side on cores.
 
-Memory is then that of as many shares as there are cores, however many runs there are.
+Memory is then that of as many shares as there are cores, however many runs there are. On a cluster workers have them.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from threading import Lock
 from typing import TypeVar
 
@@ -11,7 +12,7 @@ import jax
 import numpy as np
 
 from ..arrays import Values, aligned_zeros
-from ..programs import on_cores
+from ..workers import on_workers
 
 R = TypeVar("R")
 T = TypeVar("T")
@@ -27,9 +28,12 @@ def shares(runs: int, samples: int) -> list[slice]:
     return [slice(first, first + size) for first in range(0, runs, size)]
 
 
-def by_share(of: Callable[[slice], R], runs: int, samples: int) -> list[R]:
-    """`of` each of the `shares` of so many `runs` of so many `samples`, in order. Not to be called in `jit`."""
-    return on_cores(of, [(some,) for some in shares(runs, samples)])
+def by_share(function: Callable[..., R], own: Callable[[slice], tuple], runs: int, samples: int) -> list[R]:
+    """`function` of what is the `own` of each of the `shares` of so many `runs` of so many `samples`, in order.
+
+    A cluster finds the function by its name. Not to be called in `jit`.
+    """
+    return on_workers(function, [partial(own, some) for some in shares(runs, samples)])
 
 
 class Progress:
@@ -39,15 +43,30 @@ class Progress:
         self._done = {some.start: 0.0 for some in every}
         self._watch, self._lock = watch, Lock()
 
-    def of(self, some: slice) -> Callable[[float], object]:
+    def of(self, some: slice) -> "Told":
         """To be called with how much of a share is done."""
+        return Told(self, some.start)
 
-        def tell(part: float) -> None:
-            with self._lock:
-                self._done[some.start] = part
-                self._watch(sum(self._done.values()) / len(self._done))
+    def tell(self, first: int, part: float) -> None:
+        """So much of the share that begins with the run `first` is done."""
+        with self._lock:
+            self._done[first] = part
+            self._watch(sum(self._done.values()) / len(self._done))
 
-        return tell
+
+class Told:
+    """To be called with how much of a share is done; on a worker of a cluster it tells nobody."""
+
+    def __init__(self, progress: Progress | None = None, first: int = 0):
+        self._progress, self._first = progress, first
+
+    def __call__(self, part: float) -> None:
+        """So much of it is done."""
+        if self._progress is not None:
+            self._progress.tell(self._first, part)
+
+    def __reduce__(self) -> tuple:
+        return Told, ()
 
 
 def share_of(values: T, runs: slice) -> T:

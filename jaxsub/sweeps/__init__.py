@@ -2,7 +2,6 @@
 
 from ..results import OUTCOMES
 from .answers import answered
-from .cluster import require_cluster
 from .dataset import open_sweep
 from .description import described
 from .execute import sweep
@@ -21,7 +20,6 @@ __all__ = [
     "check_folder",
     "described",
     "open_sweep",
-    "require_cluster",
     "require_memory",
     "run_chunks",
     "succeeded",

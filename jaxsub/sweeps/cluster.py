@@ -16,26 +16,13 @@ or print `cluster.scheduler_address` and leave it running for `jaxsub sweep … 
 time limit is a worker that dies, which costs the chunks that it was at.
 """
 
-import logging
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any
 
 import jax
 
-from ..errors import InputError
+from ..workers import CACHE, LOCAL, SAME, connected, distributed
 from .plan import Chunk, Plan
 from .run import Answers
-
-LOCAL = "local"
-_PATIENCE = "5s"
-# settings of this process that every worker takes over, and those that one on the same machine can
-_SAME = ("jax_enable_x64",)
-_CACHE = (
-    "jax_compilation_cache_dir",
-    "jax_persistent_cache_min_compile_time_secs",
-    "jax_persistent_cache_min_entry_size_bytes",
-)
 
 
 def on_cluster(plan: Plan, chunks: Sequence[Chunk], address: str) -> Iterator[tuple[Chunk, Answers]]:
@@ -44,53 +31,17 @@ def on_cluster(plan: Plan, chunks: Sequence[Chunk], address: str) -> Iterator[tu
     **Raises** `InputError` where there is no `distributed`, or no scheduler at `address`; `distributed.KilledWorker`
     for a chunk that four workers died of.
     """
-    distributed = _distributed()
+    dask = distributed()
     from .worker import Prepared, run_there
 
-    with _client(distributed, address) as client:
-        settings = _SAME if address != LOCAL else (*_SAME, *_CACHE)
+    with connected(address) as client:
+        settings = SAME if address != LOCAL else (*SAME, *CACHE)
         plugin = Prepared(plan, {name: getattr(jax.config, name) for name in settings})
         client.register_plugin(plugin)
         # all at once, so that a cluster that grows with its work sees how much there is
         submitted = [client.submit(run_there, plugin.name, chunk, pure=False) for chunk in chunks]
         # it would ask the default client for its loop, which this is not
-        for future in distributed.as_completed(submitted, loop=client.loop):
+        for future in dask.as_completed(submitted, loop=client.loop):
             yield future.result()
             future.release()
         client.unregister_worker_plugin(plugin.name)
-
-
-def require_cluster(address: str) -> None:
-    """Raise `InputError` where there is no `distributed`, or no scheduler at `address`."""
-    distributed = _distributed()
-    if address != LOCAL:
-        with _client(distributed, address):
-            pass
-
-
-def _distributed() -> Any:
-    try:
-        import distributed
-    except ImportError as error:
-        raise InputError("--cluster", "needs Dask", "pip install 'jaxsub[cluster]'") from error
-    return distributed
-
-
-@contextmanager
-def _client(distributed: Any, address: str) -> Iterator[Any]:
-    if address == LOCAL:
-        settings = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.ERROR}
-        with (
-            distributed.LocalCluster(processes=True, **settings) as cluster,
-            distributed.Client(cluster, set_as_default=False) as client,
-        ):
-            yield client
-        return
-    try:
-        # a default client would take over whatever this program computes by Dask, and stays so where it finds nobody
-        client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        remedy = "give the address of a Dask scheduler, such as tcp://10.0.0.1:8786, or local"
-        raise InputError(f"--cluster {address}", "no scheduler answers there", remedy) from error
-    with client:
-        yield client

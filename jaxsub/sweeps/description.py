@@ -3,7 +3,6 @@
 import hashlib
 import json
 from collections.abc import Iterator
-from importlib import metadata
 from typing import Any
 
 import jax
@@ -11,11 +10,10 @@ import numpy as np
 
 from ..recording import Recording
 from ..vehicle import vehicle_text
+from ..workers import versions
 from .plan import Plan
 
 SCHEMA = 1
-# what the numbers depend on besides the plan
-_PACKAGES = ("jaxsub", "jax", "equinox", "optimistix")
 
 
 def described(plan: Plan) -> dict[str, Any]:
@@ -32,18 +30,6 @@ def described(plan: Plan) -> dict[str, Any]:
         "precision": str(np.dtype(jax.numpy.result_type(float))),
         "versions": versions(),
     }
-
-
-def versions() -> dict[str, str]:
-    """Of the packages that the answers depend on, here."""
-    return {package: _version(package) for package in _PACKAGES}
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:  # a checkout on the path that nobody installed
-        return "not installed"
 
 
 def digest(recording: Recording) -> str:

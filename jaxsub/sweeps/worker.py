@@ -7,7 +7,8 @@ from typing import Any
 import jax
 from distributed import WorkerPlugin, get_worker
 
-from .description import described, name_of, versions
+from ..workers import versions
+from .description import described, name_of
 from .plan import Chunk, Plan
 from .run import Answers, run_chunks
 

@@ -13,10 +13,10 @@ HOUSE = Path(jaxsub.__file__).parent
 FILES = sorted(HOUSE.rglob("*.py"))
 # lowest first; effects come before vehicle, which has them built in
 ORDER = (
-    "errors", "findings", "plain", "fingerprint", "programs", "storage", "unit_names", "units", "arrays", "methods",
-    "parameters", "results", "symbolic", "recording", "effects", "sensors", "vehicle", "simulation", "filter",
-    "navigation", "likelihood", "estimate", "information", "checks", "discrepancy", "monitoring", "control", "sweeps",
-    "report", "api", "cli", "__main__",
+    "errors", "findings", "plain", "fingerprint", "programs", "workers", "storage", "unit_names", "units", "arrays",
+    "methods", "parameters", "results", "symbolic", "recording", "effects", "sensors", "vehicle", "simulation",
+    "filter", "navigation", "likelihood", "estimate", "information", "checks", "discrepancy", "monitoring", "control",
+    "sweeps", "report", "api", "cli", "__main__",
 )  # fmt: skip
 
 

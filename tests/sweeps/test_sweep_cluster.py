@@ -65,7 +65,7 @@ def test_a_worker_killed_in_the_middle_costs_nothing(cluster, tmp_path):
 
 
 def test_no_scheduler_is_said_in_one_line(tmp_path, monkeypatch):
-    monkeypatch.setattr("jaxsub.sweeps.cluster._PATIENCE", "1s")
+    monkeypatch.setattr("jaxsub.workers._PATIENCE", "1s")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
