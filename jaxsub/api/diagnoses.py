@@ -10,7 +10,7 @@ from ..discrepancy import Conclusions
 from ..discrepancy import diagnose as conclude
 from ..discrepancy.decisions import decision_rows
 from ..discrepancy.diagnosis import Coefficient, Location, Physics, Verdict
-from ..discrepancy.next_run import next_run, said
+from ..discrepancy.next_run import next_run, sentence
 from ..discrepancy.procedure import Keep
 from ..discrepancy.progress import Progress
 from ..discrepancy.stored import STORED, load_conclusions, save_conclusions
@@ -187,7 +187,7 @@ class Diagnosis(AbstractResult):
         found = next_run(self.conclusions, train)
         if found is None:
             return self
-        advice = f"{self.conclusions.next_manoeuvre}. {said(found, NEXT_RUN)}"
+        advice = f"{self.conclusions.next_manoeuvre}. {sentence(found, NEXT_RUN)}"
         advised = dataclasses.replace(self.conclusions, next_manoeuvre=advice)
         return dataclasses.replace(self, conclusions=advised, next_run=found.recording)
 

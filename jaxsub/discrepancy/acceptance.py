@@ -14,13 +14,13 @@ from . import settings
 from .cross_validation import Comparison, Predicted, compare, one_step_ahead, simulated
 from .evidence import evidence_of
 from .model import are_significant, fit_with, is_admissible, p_value, refit, with_scaled_effects
-from .name import Named, Naming, named_on, refitted, standing
+from .name import Named, Naming, named_on, refitted, with_probabilities
 from .nonparametric import Pattern, most_explained
 from .programs import make_room
 from .progress import Progress
 from .rivals import robust_log_evidence
 from .selector import Selector
-from .verdict import Judged, helped, settled
+from .verdict import Judged, concluded, with_gain
 from .view import View, look
 from .whiteness import Memory
 
@@ -133,7 +133,7 @@ class CandidateModels:
         self.make, self.found = make, found
         self.by_numbers: dict[tuple[int, ...], Model] = {(): base}
         self.values: dict[tuple[int, ...], float] = {}
-        self.said: dict[int, Comparison] = {}
+        self.comparisons: dict[int, Comparison] = {}
 
     def effects(self, numbers: Sequence[int]) -> list[AbstractEffect]:
         """The candidates, each with the parameters that the linearised model predicts beside the others."""
@@ -175,9 +175,9 @@ class CandidateModels:
         return [i for i in sorted(p_values, key=lambda i: -p_values[i]) if not p_values[i] < settings.SIGNIFICANCE]
 
     def accepts(self, fewer: Sequence[int], more: int) -> bool:
-        """Whether one candidate more on top of `fewer` is accepted; the comparison is kept in `said`."""
-        self.said[more] = self.comparison(fewer, [*fewer, more])
-        return self.said[more].accepted
+        """Whether one candidate more on top of `fewer` is accepted; the comparison is kept in `comparisons`."""
+        self.comparisons[more] = self.comparison(fewer, [*fewer, more])
+        return self.comparisons[more].accepted
 
     def comparison(self, fewer: Sequence[int], more: Sequence[int]) -> Comparison:
         """The gain in predictive density from the one set to the other."""
@@ -276,23 +276,23 @@ def accept_proposed(
     kept = accept_singly(models, dominant(found.selector, chosen))
     if not kept and len(chosen) > 1:
         kept = accept_jointly(models, chosen) or accept_singly(models, chosen)
-    refused = [index for index, gain in models.said.items() if index not in kept and not gain.accepted]
+    refused = [index for index, gain in models.comparisons.items() if index not in kept and not gain.accepted]
     for index in [*refused, *kept]:
-        judged = helped(judged, effects[index].label, models.said[index])
+        judged = with_gain(judged, effects[index].label, models.comparisons[index])
     if not kept:
         # a fit has found the best shape of its effect: other shapes of it would end there too
         fallen = {effects[key[0]].label for key in models.by_numbers if len(key) == 1}
         found.selector.usable[[effect.label in fallen for effect in effects]] = False
     # an alternative to what simulation selected has the rivals of that; no other is compared with what was not fitted
-    freely = found.selector.freely
-    freely.update([i for i, fits in kept.items() if not freely.isdisjoint(number for number, _ in fits)])
-    return models.model([*kept]), settled(judged, with_posteriors(models, kept, refused))
+    by_simulation = found.selector.by_simulation
+    by_simulation.update([i for i, fits in kept.items() if not by_simulation.isdisjoint(number for number, _ in fits)])
+    return models.model([*kept]), concluded(judged, with_posteriors(models, kept, refused))
 
 
 def with_posteriors(models: CandidateModels, kept: dict[int, Fits], refused: Sequence[int]) -> list[Named]:
     """The accepted effects with the posterior probabilities of their alternatives by the log evidence of fits."""
     selector = models.found.selector
-    named = standing(selector, [*kept], refused)
+    named = with_probabilities(selector, [*kept], refused)
     return [refitted(one, [(selector.candidates[i], value) for i, value in kept[one.number]]) for one in named]
 
 
@@ -306,13 +306,13 @@ def proposed_effects(found: Examination, judged: Judged) -> list[int]:
     if judged.named:
         return numbers
     selector = found.selector
-    share = selector.ruling()
+    share = selector.majority_shares()
     if not np.any(share):
         return []
-    nameless = 1.0 - most_explained(found.view, selector.free.disturbance)
+    nonparametric = 1.0 - most_explained(found.view, selector.simulation.disturbance)
     for among, less in ((numbers, settings.LARGE_ERROR**2), (range(len(share)), 1.0)):
         best = max(among, key=lambda i: share[i], default=None)
-        if best is not None and share[best] > 0.0 and 1.0 - share[best] <= less * nameless:
-            selector.freely.add(best)
+        if best is not None and share[best] > 0.0 and 1.0 - share[best] <= less * nonparametric:
+            selector.by_simulation.add(best)
             return [best]
     return []

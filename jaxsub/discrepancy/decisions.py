@@ -21,8 +21,8 @@ class Decision:
 
     def to_json(self) -> dict[str, Any]:
         """As it stands in `diagnosis.json`; null for a statistic that is no number, as of a model that diverges."""
-        said = dataclasses.asdict(self)
-        return said | {"statistic": self.statistic if math.isfinite(self.statistic) else None}
+        record = dataclasses.asdict(self)
+        return record | {"statistic": self.statistic if math.isfinite(self.statistic) else None}
 
 
 def decision_rows(decisions: Sequence[Decision]) -> list[tuple[str, str, str, str, str]]:

@@ -159,12 +159,12 @@ class Remainder:
 
     def to_json(self) -> dict[str, Any]:
         """What of it is a number: the interval and the two tests; null where a run diverges or nothing was measured."""
-        said = lambda value: value if math.isfinite(value) else None
+        finite = lambda value: value if math.isfinite(value) else None
         return {
-            "rms_interval": [said(self.low), said(self.high)],
-            "random_p_value": said(self.random),
+            "rms_interval": [finite(self.low), finite(self.high)],
+            "random_p_value": finite(self.random),
             "follows": self.follows,
-            "independent_p_value": said(self.independent),
+            "independent_p_value": finite(self.independent),
         }
 
 

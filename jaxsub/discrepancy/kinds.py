@@ -46,7 +46,7 @@ def missing(named: Sequence[Named]) -> dict[str, float]:
 def leading(found: Examination) -> dict[str, float]:
     """Posterior probability of each kind that it holds the largest mismatch, by the first examination."""
     selector, scan = found.selector, found.naming.first
-    values, nothing = selector.freely_valued() if found.naming.again else (scan.value, selector.value([]))
+    values, nothing = selector.evidence_in_simulation() if found.naming.again else (scan.value, selector.value([]))
     of_name: dict[tuple[str, str], list[float]] = {}
     for effect, value in zip(selector.candidates, np.where(np.isfinite(scan.value), values, -np.inf), strict=True):
         of_name.setdefault((kind(effect), effect.name), []).append(float(value))

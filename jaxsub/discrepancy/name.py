@@ -77,7 +77,7 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
         progress(f"weighing the vocabulary ({len(chosen)} effects so far)")
         scan = _settled(selector, chosen)
         scans.append(scan)
-        best = selector.foremost(chosen, scan)
+        best = selector.next_candidate(chosen, scan)
         gain = scan.value[best] - selector.value(chosen)
         p_values.append(selector.p_value(best, scan) if np.isfinite(gain) else 1.0)
         if not gain > 0.0 or p_values[-1] >= settings.SIGNIFICANCE or len(chosen) == settings.MOST_EFFECTS:
@@ -87,7 +87,7 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
             scans.pop()
             p_values.pop()
             continue
-        if best in selector.freely:
+        if best in selector.by_simulation:
             return [*chosen, best], scans, p_values
         chosen = _without_idle(selector, [*chosen, best])
 
@@ -100,7 +100,7 @@ def _settled(selector: Selector, chosen: list[int]) -> Scan:
     scan = _led(selector, chosen)
     if np.max(scan.value) > selector.value(chosen):
         return scan
-    for index in selector.hidden(chosen):
+    for index in selector.absorbed(chosen):
         selector.estimate([*chosen, index])
     return selector.scan(chosen)
 
@@ -135,14 +135,14 @@ def name(selector: Selector, progress: Progress) -> Naming:
     """The selected effects with their posterior probabilities."""
     chosen, scans, _ = select(selector, progress)
     value, products = selector.evidence.best(selector.columns(chosen))
-    named = standing(selector, chosen)
+    named = with_probabilities(selector, chosen)
     lines = table(selector, scans[0])
-    again = any(i in selector.freely for i in chosen)
+    again = any(i in selector.by_simulation for i in chosen)
     first_p = selector.smallest_p_value(scans[0])
     return Naming(named, products, selector.columns(chosen), value, again, scans[0], lines, first_p)
 
 
-def standing(selector: Selector, chosen: Sequence[int], refused: Collection[int] = ()) -> list[Named]:
+def with_probabilities(selector: Selector, chosen: Sequence[int], refused: Collection[int] = ()) -> list[Named]:
     """Each of some candidates with its posterior probability and rivals, the others of them in the model."""
     return [named_on(selector, [i for i in chosen if i != index], index, refused) for index in chosen]
 
@@ -151,8 +151,8 @@ def named_on(selector: Selector, others: Sequence[int], index: int, refused: Col
     """A candidate on top of `others` with its posterior probability and rivals, less those `refused`."""
     scan = selector.scan(others)
     out = {selector.candidates[i].name for i in refused} - {selector.candidates[index].name}
-    may = selector.stand_in(others, index) & np.array([effect.name not in out for effect in selector.candidates])
-    if index not in selector.freely:
+    may = selector.alternatives_to(others, index) & np.array([effect.name not in out for effect in selector.candidates])
+    if index not in selector.by_simulation:
         may &= ~significant_beside(selector, others, index, scan)
     may[index] = True
     log = np.where(may, scan.value, -np.inf)
@@ -187,8 +187,8 @@ def significant_beside(selector: Selector, others: Sequence[int], index: int, sc
     Then it is missing too, and no rival.
     """
     beside = selector.scan([*others, index])
-    asked = np.array([selector.p_value(i, beside) < settings.SIGNIFICANCE for i in range(len(beside.value))])
-    return asked & (beside.statistic > settings.MAJORITY * scan.statistic)
+    significant = np.array([selector.p_value(i, beside) < settings.SIGNIFICANCE for i in range(len(beside.value))])
+    return significant & (beside.statistic > settings.MAJORITY * scan.statistic)
 
 
 def refitted(named: Named, values: Sequence[tuple[AbstractEffect, float]]) -> Named:
@@ -215,9 +215,9 @@ def table(selector: Selector, scan: Scan) -> list[Candidate]:
         predicted = {symbols[field]: value for field, value in numbers(effect).items()}
         p_value = selector.p_value(int(i), scan)
         kept = float(selector.kept[i]) if selector.usable[i] else 0.0
-        said = _outcome(bool(selector.usable[i]), bool(scan.right[i]), p_value)
+        outcome = _outcome(bool(selector.usable[i]), bool(scan.right[i]), p_value)
         units = {symbols[field]: unit for field, unit in effect.units().items()}
-        line = Candidate(effect.name, effect.label, statistic, degrees, p_value, predicted, kept, said, units)
+        line = Candidate(effect.name, effect.label, statistic, degrees, p_value, predicted, kept, outcome, units)
         lines.setdefault(f"{effect.label} {sorted(symbols.values())}", line)
     return list(lines.values())
 

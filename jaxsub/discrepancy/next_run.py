@@ -27,7 +27,7 @@ def next_run(diagnosis: Conclusions, train: Sequence[Recording]) -> Manoeuvre | 
     return separating_manoeuvre(fitted, train[0], sigma, duration=min(train[0].duration, _LONGEST))
 
 
-def said(found: Manoeuvre, file: str) -> str:
+def sentence(found: Manoeuvre, file: str) -> str:
     """One sentence on a manoeuvre that was written to `file`."""
     gain = f"{found.separation:.3g} (χ² between the closest two; {found.before:.3g} with the inputs recorded here)"
     return f"The inputs in {file}, found for this vehicle within the limits it kept, should tell them apart by {gain}."

@@ -70,8 +70,8 @@ class Pattern:
         # a wave brings its place on two axes with it
         count = lambda pick: len(pick) + 2 * sum(term.startswith("sin") for term in pick)
         pick, weights, left = min(fits, key=lambda fit: KNOTS * np.log(fit[2] + 1e-12) + count(fit[0]) * np.log(KNOTS))
-        said = " + ".join(f"{w:.3g} {t}" for w, t in zip(weights, pick, strict=True))
-        return f"about {said}, which leaves {np.sqrt(left):.0%} of it"
+        formula = " + ".join(f"{w:.3g} {t}" for w, t in zip(weights, pick, strict=True))
+        return f"about {formula}, which leaves {np.sqrt(left):.0%} of it"
 
 
 def _wave(kappa: float, x: np.ndarray, y: np.ndarray) -> tuple[float, float, np.ndarray]:
@@ -99,11 +99,11 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     system = chosen.within(columns, under[-1]).view.followed.system
     mean, _ = smoothed(under[-1].disturbance, system, left)
     weighed = promising_forces(view, forces, np.asarray(mean))
-    asked = [one for products in under for one in with_smaller(products.disturbance)]
+    disturbances = [one for products in under for one in with_smaller(products.disturbance)]
     # one force after the other: products between forces are not needed
     picked = chosen.columns.picked([c for c in columns if c < len(chosen.columns)])
     beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))
-    made = (Evidence.of(view, beside(force), asked, chosen.varied) for force in weighed)
+    made = (Evidence.of(view, beside(force), disturbances, chosen.varied) for force in weighed)
     varying = [c - len(chosen.columns) for c in columns if c >= len(chosen.columns)]
     every = [_Weighed(found.products, found.length, len(picked), varying) for found in made]
     values = [each.values(each.held) for each in every]

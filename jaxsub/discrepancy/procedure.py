@@ -250,11 +250,10 @@ def disturbance_note(view: View) -> list[str]:
     total = np.asarray(view.followed.force).std(axis=(0, 1))
     # a mechanism's coordinate may be of any unit
     sized = lambda e, q: f"{float(q):.3g} {FORCE_UNITS.get(e, '')}".strip()
-    said = [
+    forces = [
         f"{e} {sized(e, q)}, {float(t):.2g} s"
         for e, q, t, rms in zip(layout.equations, disturbance.force, disturbance.time, total, strict=True)
         if rms > _REPORTED_DISTURBANCE * float(q)
     ]
-    return (
-        [f"Random disturbance forces remain (standard deviation, correlation time): {'; '.join(said)}."] if said else []
-    )
+    whole = f"Random disturbance forces remain (standard deviation, correlation time): {'; '.join(forces)}."
+    return [whole] if forces else []

@@ -31,10 +31,10 @@ def with_replacement(progress: Progress, model: Model, judged: Judged) -> tuple[
 
 def replaceable(model: Model) -> list[str]:
     """The free coefficients that added effects may replace: zero is admissible, and Wald's test does not reject it."""
-    asked = {name for effect in model.added for name in effect.replaces}
-    if not asked:
+    replaced = {name for effect in model.added for name in effect.replaces}
+    if not replaced:
         return []
     rows = model.view.vehicle.layout.free
-    may = lambda row: row.name in asked and row.lower <= 0.0 <= row.upper and not row.varies
+    may = lambda row: row.name in replaced and row.lower <= 0.0 <= row.upper and not row.varies
     idle = lambda place: not wald_p_value(model.view, [place]) < settings.SIGNIFICANCE
     return [row.name for place, row in enumerate(rows) if may(row) and idle(place)]

@@ -88,8 +88,8 @@ class Selector:
         own = evidence.view.disturbance
         # a simulation has no disturbance that could absorb its error
         still = Disturbance(_STILL * own.force, own.time, np.ones_like(own.noise))
-        self.free = evidence.under(still)
-        self.lost = False
+        self.simulation = evidence.under(still)
+        self.ignores_simulation = False
         forms = collections.Counter(effect.name for effect in self.candidates)
         # every name is as probable as any other before the data, and within a name every form
         self.prior = -np.log([looked_at.get(effect.name, forms[effect.name]) for effect in self.candidates])
@@ -107,21 +107,21 @@ class Selector:
     def _begin(self) -> None:
         """Nothing is estimated; what the coefficients absorb or the vehicle has is no candidate."""
         self.estimated: set[tuple[int, ...]] = set()
-        self.freely: set[int] = set()
+        self.by_simulation: set[int] = set()
         self.kept = self.evidence.products[0].kept(self.owners)
         present = {effect.label for effect in self.evidence.view.vehicle.all_effects}
         absent = np.array([effect.label not in present for effect in self.candidates], bool)
         self.usable = np.isfinite(self.kept) & (self.kept > settings.IDENTIFIABLE_SHARE) & absent
-        asked = [self.owners[i] for i in np.flatnonzero(self.usable & ~self.varying)]
+        columns = [self.owners[i] for i in np.flatnonzero(self.usable & ~self.varying)]
         squares, _ = self.evidence.products[0].remaining([], range(len(self.evidence.length)))
         # numbers that may differ by run have columns of their own, and count as one test each
         varying = int(np.sum(self.usable & self.varying))
-        self.tests = independent_tests(squares, asked, 1.0 / self.evidence.products[0].samples) + varying
+        self.tests = independent_tests(squares, columns, 1.0 / self.evidence.products[0].samples) + varying
 
     def seen_from(self, view: View, keep: np.ndarray) -> "Selector":
         """The same candidates for a view that `Evidence.seen_from` takes."""
         other = copy.copy(self)
-        other.evidence, other.free = self.evidence.seen_from(view, keep), self.free.seen_from(keep)
+        other.evidence, other.simulation = self.evidence.seen_from(view, keep), self.simulation.seen_from(keep)
         other._begin()
         return other
 
@@ -166,20 +166,20 @@ class Selector:
         value = best + self.prior + float(np.sum(self.prior[list(chosen)]))
         return Scan(np.where(fine, value, -np.inf), np.where(self.usable, statistic, 0.0), effects, right)
 
-    def hidden(self, chosen: Sequence[int]) -> list[int]:
+    def absorbed(self, chosen: Sequence[int]) -> list[int]:
         """The best candidates on top of `chosen` under smaller disturbances, which may have absorbed them."""
         scans = [self.scan(chosen, under) for under in self.evidence.given[1:]]
         leaders = {int(np.argmax(scan.value)): float(np.max(scan.value)) for scan in scans}
         return [index for index, value in leaders.items() if np.isfinite(value)]
 
-    def of_free_run(self, chosen: Sequence[int]) -> np.ndarray:
+    def simulation_shares(self, chosen: Sequence[int]) -> np.ndarray:
         """(m,) the share of the simulation error left by `chosen` that each candidate explains."""
-        return self.free.explained(self.columns(chosen), self.owners)
+        return self.simulation.explained(self.columns(chosen), self.owners)
 
-    def freely_valued(self) -> tuple[np.ndarray, float]:
+    def evidence_in_simulation(self) -> tuple[np.ndarray, float]:
         """(m,) log evidence of the simulation error with each candidate alone, as `value`, and with none."""
-        without = self.free.log_evidence([])
-        return without + self.free.gains([], self.owners).evidence + self.prior, without
+        without = self.simulation.log_evidence([])
+        return without + self.simulation.gains([], self.owners).evidence + self.prior, without
 
     def predicted(self, chosen: Sequence[int], index: int, under: Products) -> tuple[AbstractEffect, bool]:
         """A candidate with the parameters predicted beside `chosen`, and whether physics admits them."""
@@ -187,25 +187,25 @@ class Selector:
         size = under.gains(self.columns(chosen), [own]).amplitudes[0]
         return predict(self.candidates[index], size / self.evidence.lengths[own])
 
-    def lose_free_run(self) -> None:
+    def ignore_simulation(self) -> None:
         """Select by simulation no more: its selection was rejected, and accumulated errors have other causes."""
-        self.lost = True
-        self.freely.clear()
+        self.ignores_simulation = True
+        self.by_simulation.clear()
 
-    def foremost(self, chosen: Sequence[int], scan: Scan) -> int:
+    def next_candidate(self, chosen: Sequence[int], scan: Scan) -> int:
         """Which candidate to select next: the most probable, unless it explains little of the simulation error.
 
         Then the one that explains most of it: fast dynamics show in very many samples, and may not matter for long.
         """
         best = int(np.argmax(scan.value))
-        share = self.of_free_run(chosen)
-        if self.lost or share[best] > settings.MINOR_SHARE:
+        share = self.simulation_shares(chosen)
+        if self.ignores_simulation or share[best] > settings.MINOR_SHARE:
             return best
         major = self._significant(chosen, scan) & (share > settings.MAJOR_SHARE)
         if not np.any(major):
             return best
         best = int(np.argmax(np.where(major, share, -np.inf)))
-        self.freely.add(best)
+        self.by_simulation.add(best)
         return best
 
     def _significant(self, chosen: Sequence[int], scan: Scan) -> np.ndarray:
@@ -213,33 +213,36 @@ class Selector:
         p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
         return (scan.value > self.value(chosen)) & (p_values < settings.SIGNIFICANCE)
 
-    def ruling(self) -> np.ndarray:
+    def majority_shares(self) -> np.ndarray:
         """(m,) the share of a simulation error far above the noise that each candidate alone explains.
 
         0 where it is not most of them, or where the candidate is not significant.
         """
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
-        share = self.of_free_run([])
-        if self.lost or not self.free.gram[0, 0] > settings.LARGE_ERROR**2 * noise * self.free.samples:
+        share = self.simulation_shares([])
+        if (
+            self.ignores_simulation
+            or not self.simulation.gram[0, 0] > settings.LARGE_ERROR**2 * noise * self.simulation.samples
+        ):
             return np.zeros_like(share)
         return np.where((share > settings.MAJORITY) & self._significant([], self.scan([])), share, 0.0)
 
-    def stand_in(self, chosen: Sequence[int], index: int) -> np.ndarray:
+    def alternatives_to(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate is an alternative to `index` on top of `chosen`.
 
         Where simulation selected it, those are none that leave much more of the simulation error or explain much less.
         """
-        if index not in self.freely:
+        if index not in self.by_simulation:
             return np.ones(len(self.candidates), bool)
-        share = self.of_free_run(chosen)
+        share = self.simulation_shares(chosen)
         most = settings.MAJORITY
         return (most * (1.0 - share) <= 1.0 - share[index]) & (share >= most * share[index])
 
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
         """Whether `more` improves the prediction of parts of the recordings by the others, or of a simulation."""
         before, after = self.columns(chosen), self.columns([*chosen, more])
-        free = more in self.freely
-        without, with_it = (self.free if free else self.evidence.best(columns)[1] for columns in (before, after))
+        free = more in self.by_simulation
+        without, with_it = (self.simulation if free else self.evidence.best(columns)[1] for columns in (before, after))
         predicted = lambda columns, products: float(np.sum(self.evidence.predicted(columns, products)))
         return predicted(after, with_it) > predicted(before, without)
 

@@ -16,59 +16,59 @@ from .cross_validation import Comparison, compare
 from .examine import listed, weighed
 from .innovation_models import InnovationModels, selector_without, validated_in_simulation
 from .model import p_value
-from .name import Named, named_on, refitted, significant_beside, standing
+from .name import Named, named_on, refitted, significant_beside, with_probabilities
 from .rivals import robust_log_evidence
 from .selector import Selector
-from .verdict import NOTHING, Judged, both, by_all, helped, judge, settled
+from .verdict import NOTHING, Judged, combined, concluded, found_by_innovations, judge, with_gain
 
 
 def stepwise_by_innovations(
     fitter: ModelFitter, base: Model, vocabulary: tuple[type[AbstractEffect], ...] | None
 ) -> tuple[Model, Judged] | None:
     """The model that stepwise selection by innovations ends with, and the judgement; None if simulation rejects it."""
-    ahead = InnovationModels(fitter)
-    search = _Search(ahead, ahead.begin(base), vocabulary)
+    by_innovations = InnovationModels(fitter)
+    search = _Search(by_innovations, by_innovations.begin(base), vocabulary)
     best, named = search.start, list[Named]()
     judged, fallen, refusals = NOTHING, set[str](), 0
     while refusals <= settings.ALTERNATIVES:
         selector = search.listed(best)
         selector.usable[[effect.label in fallen for effect in selector.candidates]] = False
         found = weighed(best.view, selector, fitter.progress)
-        said = judge(found.naming, found.pattern, found.memory)
-        chosen = proposed_effects(found, said)
+        linearised = judge(found.naming, found.pattern, found.memory)
+        chosen = proposed_effects(found, linearised)
         if not chosen:
             break
-        grown = search.extended(CandidateModels(ahead.with_effects, best, found), chosen, named)
+        grown = search.extended(CandidateModels(by_innovations.with_effects, best, found), chosen, named)
         if grown is None:
             fallen.add(selector.candidates[chosen[0]].label)
             refusals += 1
             continue
-        judged = both(judged, dataclasses.replace(said, named=[], notes=[]))
+        judged = combined(judged, dataclasses.replace(linearised, named=[], notes=[]))
         best, named, refused = grown
         fallen |= refused
         best, named = search.with_alternatives(best, named)
-    best, named, gains = backward_eliminated(ahead, search.start, best, named)
+    best, named, gains = backward_eliminated(by_innovations, search.start, best, named)
     whole = validated_in_simulation(fitter, base, best) if named else None
     if whole is None:
         return None
-    judged = settled(judged, named)
+    judged = concluded(judged, named)
     for one in named:
-        judged = helped(judged, one.effect.label, gains[one.effect.label])
-    return whole, by_all(judged, whole.pieces)
+        judged = with_gain(judged, one.effect.label, gains[one.effect.label])
+    return whole, found_by_innovations(judged, whole.pieces)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Search:
     """What the steps of one selection share: how models are made, the model it starts from, and the vocabulary."""
 
-    ahead: InnovationModels
+    by_innovations: InnovationModels
     start: Model
     vocabulary: tuple[type[AbstractEffect], ...] | None
 
     def listed(self, model: Model, *, present: bool = False) -> Selector:
         """The candidates on top of a model; with `present` also the effects that it has."""
         selector = listed(model.view, self.vocabulary, present=present)
-        selector.lose_free_run()
+        selector.ignore_simulation()
         return selector
 
     def extended(
@@ -82,8 +82,8 @@ class _Search:
         before = models.model([])
         for some in [chosen, chosen[:1]][: len(chosen)]:
             kept = without_insignificant(models, some)
-            more = [*named, *standing(models.found.selector, kept)]
-            model, stand, _ = backward_eliminated(self.ahead, self.start, models.model(kept), more)
+            more = [*named, *with_probabilities(models.found.selector, kept)]
+            model, stand, _ = backward_eliminated(self.by_innovations, self.start, models.model(kept), more)
             if compare(before.predicted, model.predicted, model.significant).accepted:
                 return model, stand, {one.effect.label for one in more} - {one.effect.label for one in stand}
         return None
@@ -93,7 +93,7 @@ class _Search:
 
         An effect selected first may have been a surrogate of one that was selected later.
         """
-        said, every = [], self.listed(best, present=True)
+        kept, every = [], self.listed(best, present=True)
         for one in named:
             one, others = self._beside(best, every, one)
             tried = [(one.effect, best), *((rival, self._without(best, one, rival)) for rival in others)]
@@ -104,15 +104,15 @@ class _Search:
             fits = [(effect, model, value) for (effect, model), value in zip(tried, values, strict=True)]
             effect, model, _ = max(fits, key=lambda fit: (fit[1].significant, fit[2]))
             if model is best:
-                said.append(refitted(one, [(effect, value) for effect, _, value in fits]))
+                kept.append(refitted(one, [(effect, value) for effect, _, value in fits]))
             else:
                 best, every = model, self.listed(model, present=True)
-                said.append(self._beside(best, every, dataclasses.replace(one, effect=effect))[0])
-        return best, said
+                kept.append(self._beside(best, every, dataclasses.replace(one, effect=effect))[0])
+        return best, kept
 
     def _without(self, best: Model, one: Named, *rival: AbstractEffect) -> Model:
         """The model without one effect, or with a rival in its place."""
-        return self.ahead.replaced(self.start, best, one.effect.label, *rival)
+        return self.by_innovations.replaced(self.start, best, one.effect.label, *rival)
 
     def _beside(self, best: Model, every: Selector, one: Named) -> tuple[Named, list[AbstractEffect]]:
         """The posterior probability of an effect beside all others of a model, and its rivals, the best first.
@@ -121,10 +121,10 @@ class _Search:
         the linearisation does not restore the evidence of the effect itself.
         """
         whole = every.evidence.best([])[0]
-        asked = (lambda: selector_without(every, one.effect), lambda: self.listed(self._without(best, one)))
+        selectors = (lambda: selector_without(every, one.effect), lambda: self.listed(self._without(best, one)))
         # differences between runs are no sum of columns that a linearisation could take away
-        for ask in asked[isinstance(one.effect, RunVariation) :]:
-            selector = ask()
+        for make in selectors[isinstance(one.effect, RunVariation) :]:
+            selector = make()
             scan = selector.scan([])
             own = [i for i, effect in enumerate(selector.candidates) if effect.label == one.effect.label]
             number = max(own, key=lambda i, value=scan.value: value[i])
@@ -143,21 +143,21 @@ class _Search:
 
 
 def backward_eliminated(
-    ahead: InnovationModels, start: Model, best: Model, named: Sequence[Named]
+    by_innovations: InnovationModels, start: Model, best: Model, named: Sequence[Named]
 ) -> tuple[Model, list[Named], dict[str, Comparison]]:
     """Backward elimination: the model with those of `named` that are accepted beside the others, and their gains."""
     while named and best.view.finite:
-        gains = {one.effect.label: ahead.gain_by(best, one.effect) for one in named}
+        gains = {one.effect.label: by_innovations.gain_by(best, one.effect) for one in named}
         p_values = {one.effect.label: p_value(best.view, one.effect) for one in named}
         # first of all what is not significant, then what is not accepted, the least gain first
-        asked = lambda label, gains=gains, p_values=p_values: (
+        order = lambda label, gains=gains, p_values=p_values: (
             -max(p_values[label], settings.SIGNIFICANCE),
             gains[label].accepted,
             np.nan_to_num(gains[label].one_step.total),
         )
-        worst = min(gains, key=asked)
+        worst = min(gains, key=order)
         if gains[worst].accepted and p_values[worst] < settings.SIGNIFICANCE:
             return best, [*named], gains
         named = [one for one in named if one.effect.label != worst]
-        best = ahead.replaced(start, best, worst)
+        best = by_innovations.replaced(start, best, worst)
     return start, [], {}

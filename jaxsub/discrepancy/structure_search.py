@@ -10,11 +10,11 @@ from .acceptance import Examination, Model, ModelFitter, accept_proposed, propos
 from .cross_validation import compare
 from .evidence import evidence_of
 from .examine import examine, weighed
-from .name import standing
+from .name import with_probabilities
 from .progress import OutOfTime
 from .replacement import with_replacement
 from .stepwise import stepwise_by_innovations
-from .verdict import NOTHING, Judged, both, by_fit, helped, idle, incomplete, judge, settled
+from .verdict import NOTHING, Judged, by_fit, combined, concluded, incomplete, judge, with_gain, without_effect
 from .whiteness import share_of
 
 # a model, the judgement with it, and the examination of what it leaves, if anything may be left
@@ -65,10 +65,10 @@ def answers(
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
     # a simulation that cannot be fitted proposes nothing
-    told_ahead = not baseline.fit.converged
-    ahead = stepwise_by_innovations(fitter, baseline, vocabulary) if told_ahead else None
-    if ahead is not None:
-        return *ahead, None
+    searched = not baseline.fit.converged
+    by_innovations = stepwise_by_innovations(fitter, baseline, vocabulary) if searched else None
+    if by_innovations is not None:
+        return *by_innovations, None
     if begin:
         best, judged = warm_started(fitter, baseline, found, begin)
         if judged.named:
@@ -76,33 +76,33 @@ def answers(
             yield best, judged
             found = examine(best.view, vocabulary, fitter.progress)
     while True:
-        said, after = judge(found.naming, found.pattern, found.memory), None
-        chosen = proposed_effects(found, said)
+        current, after = judge(found.naming, found.pattern, found.memory), None
+        chosen = proposed_effects(found, current)
         # an effect dropped once and proposed again stays, or the search would cycle
         older = [effect for effect in best.added if effect.label not in dropped]
         if chosen:
-            best, said = accept_proposed(fitter, best, found, chosen, said)
+            best, current = accept_proposed(fitter, best, found, chosen, current)
         else:
-            best, said, after = reconsidered(fitter, best, found, said, vocabulary)
-        judged = both(judged, said)
-        if chosen and said.named:
+            best, current, after = reconsidered(fitter, best, found, current, vocabulary)
+        judged = combined(judged, current)
+        if chosen and current.named:
             best, judged = without_redundant(fitter, baseline, best, judged, older)
             dropped |= {effect.label for effect in older} - {effect.label for effect in best.added}
-        if said.named:
+        if current.named:
             best, judged = with_replacement(fitter.progress, best, judged)
-        if chosen and not said.named:
-            ahead = None if told_ahead else stepwise_by_innovations(fitter, best, vocabulary)
-            if ahead is not None:
-                return ahead[0], both(judged, ahead[1]), None
-            told_ahead = True
-            if said.verdict == "unknown" and refusals < settings.ALTERNATIVES:
+        if chosen and not current.named:
+            by_innovations = None if searched else stepwise_by_innovations(fitter, best, vocabulary)
+            if by_innovations is not None:
+                return by_innovations[0], combined(judged, by_innovations[1]), None
+            searched = True
+            if current.verdict == "unknown" and refusals < settings.ALTERNATIVES:
                 refusals, after = refusals + 1, weighed(found.view, found.selector, fitter.progress)
-        if after is None and not said.named:
+        if after is None and not current.named:
             return best, judged, found
-        whole = len(said.named) == len(found.naming.named) and not (found.naming.again or found.unexplained)
+        whole = len(current.named) == len(found.naming.named) and not (found.naming.again or found.unexplained)
         if (after is None and whole) or len(best.added) >= settings.MOST_EFFECTS:
             return best, judged, None
-        if said.named:
+        if current.named:
             yield best, judged
         found = after or examine(best.view, vocabulary, fitter.progress)
 
@@ -125,9 +125,9 @@ def warm_started(
         numbers.append(max(own, key=lambda i: found.naming.first.value[i]))
     model = fitter.with_effects(baseline, effects, found.naming.products.disturbance)
     gain = compare(baseline.predicted, model.predicted, model.significant)
-    named = standing(selector, numbers) if gain.accepted else []
+    named = with_probabilities(selector, numbers) if gain.accepted else []
     judged = dataclasses.replace(NOTHING, p_value=min(1.0, 2.0 * found.naming.first_p))
-    return (model if gain.accepted else baseline), settled(helped(judged, ", ".join(labels), gain), named)
+    return (model if gain.accepted else baseline), concluded(with_gain(judged, ", ".join(labels), gain), named)
 
 
 def without_redundant(
@@ -144,7 +144,7 @@ def without_redundant(
         )
         comparison = compare(fewer.predicted, best.predicted)
         if not comparison.accepted and fewer.significant:
-            best, judged = fewer, idle(judged, effect.label, others, comparison)
+            best, judged = fewer, without_effect(judged, effect.label, others, comparison)
     return best, judged
 
 
@@ -166,14 +166,14 @@ def reconsidered(
     most = found.nonparametric is None and found.memory.correlated and found.memory.explained > settings.MAJORITY
     named = found.naming.named
     here = [one.number for one in (named if most else [o for o in named if found.nonparametric in o.effect.where][:1])]
-    best, said = accept_proposed(fitter, base, found, here, judged) if here else (base, judged)
-    if not said.named:
+    best, current = accept_proposed(fitter, base, found, here, judged) if here else (base, judged)
+    if not current.named:
         return base, judged, None
     more = examine(best.view, vocabulary, fitter.progress)
     share = _explained(base, best, more)
     enough = more.nonparametric is None and share >= settings.EXPLAINED
     stands = enough if most else more.nonparametric != found.nonparametric
-    return (best, by_fit(said, share) if most else said, more) if stands else (base, judged, None)
+    return (best, by_fit(current, share) if most else current, more) if stands else (base, judged, None)
 
 
 def _explained(base: Model, best: Model, found: Examination) -> float:

@@ -24,14 +24,14 @@ def summary(
     described = [effect.label for effect in standing if effect not in forces]
     described += [f"a smooth force in {force.equation}" for force in forces]
     added = f" Surrogates for unknown physics, which claim no cause: {', '.join(described)}." if described else ""
-    said = [_verdict(verdict, physics, where, found, p_value) + added]
+    sentences = [_verdict(verdict, physics, where, found, p_value) + added]
     if found is None:
-        said.append("The test runs were not looked at yet.")
+        sentences.append("The test runs were not looked at yet.")
     elif physics or standing:
-        said.append(explained_sentence(found))
+        sentences.append(explained_sentence(found))
     elif verdict == "unknown":
-        said.append(_test_error(found))
-    return " ".join(said)
+        sentences.append(_test_error(found))
+    return " ".join(sentences)
 
 
 def explained_sentence(found: Explained) -> str:

@@ -21,7 +21,7 @@ from .model import is_admissible, with_coloured_errors
 from .products import Products
 from .progress import OutOfTime
 from .selector import Selector
-from .verdict import Judged, helped, incomplete, standing_in
+from .verdict import Judged, incomplete, with_gain, with_surrogate_note
 
 
 def with_surrogate(
@@ -54,9 +54,9 @@ def _described(
         if more is None:
             break
         model, selector = more, listed(more.view, vocabulary)
-    standing = model.added[len(named.added) :]
-    if standing:
-        judged = standing_in(judged, standing)
+    added = model.added[len(named.added) :]
+    if added:
+        judged = with_surrogate_note(judged, added)
         found = weighed(model.view, selector, fitter.progress)
     return _with_force(fitter, named, model, found, judged)
 
@@ -65,27 +65,27 @@ def _with_more(fitter: ModelFitter, named: Model, model: Model, selector: Select
     """The model with terms that explain most of its error, if they are accepted: in simulation first, then one step on.
 
     A simulation that other causes have led far off proposes what imitates them, and under a larger disturbance an error
-    is told from them. Terms with inadmissible fitted parameters are left out for good, with their labels in
+    differs from them. Terms with inadmissible fitted parameters are left out for good, with their labels in
     `fallen`, and where none of them is admissible others are tried. Of terms that are rejected only the first half is
     tried again.
     """
     left_out = lambda: [effect.label in fallen for effect in selector.candidates]
     selector.usable[left_out()] = False
     fits, disturbance = 0, selector.evidence.best([])[1].disturbance
-    for products in (selector.free, *reversed(selector.evidence.given)):
-        asked = most_explaining(selector, products)
-        while asked and fits < settings.MOST_EFFECTS:
-            more, fits = _fitted(fitter, named, model, asked, disturbance), fits + 1
-            wrong = {effect.label for effect in asked if not is_admissible(more.fit, [effect])}
+    for products in (selector.simulation, *reversed(selector.evidence.given)):
+        proposed = most_explaining(selector, products)
+        while proposed and fits < settings.MOST_EFFECTS:
+            more, fits = _fitted(fitter, named, model, proposed, disturbance), fits + 1
+            wrong = {effect.label for effect in proposed if not is_admissible(more.fit, [effect])}
             if wrong:
                 fallen |= wrong
                 selector.usable[left_out()] = False
-                asked = [effect for effect in asked if effect.label not in wrong]
-                asked = asked or most_explaining(selector, products)
+                proposed = [effect for effect in proposed if effect.label not in wrong]
+                proposed = proposed or most_explaining(selector, products)
             elif _worth(model, more):
                 return more
             else:
-                asked = asked[: len(asked) // 2]
+                proposed = proposed[: len(proposed) // 2]
     return None
 
 
@@ -158,8 +158,8 @@ def _with_force(
         more = _fitted(fitter, named, base, [less], disturbance)
         gain = compare(base.predicted, more.predicted, more.admissible)
         if gain.accepted and more.view.finite:
-            return more, helped(judged, less.label, gain)
+            return more, with_gain(judged, less.label, gain)
         if gain.ratio > last:
             break
         last = gain.ratio
-    return base, helped(judged, force.label, gain)
+    return base, with_gain(judged, force.label, gain)

@@ -51,8 +51,8 @@ def beyond_noise(left: dict[str, Remainder], rms: dict[str, float], layout: Layo
     stated = [output.name for output in layout.outputs if output.sigma is not None]
     found = [c for c in stated if left[c].low > 1.0 and left[c].random < settings.RESIDUAL_LEVEL]
     led = lambda one: f", with {one.follows}" if one.independent < settings.RESIDUAL_LEVEL else ""
-    said = ", ".join(f"{c} ({rms[c]:.2g} σ{led(left[c])})" for c in found)
-    return [f"Simulation of the test runs leaves more than noise in {said}."] if found else []
+    channels = ", ".join(f"{c} ({rms[c]:.2g} σ{led(left[c])})" for c in found)
+    return [f"Simulation of the test runs leaves more than noise in {channels}."] if found else []
 
 
 def _remainder(

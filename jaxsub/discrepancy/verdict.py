@@ -32,7 +32,7 @@ class Judged:
 NOTHING = Judged("none", [], 1.0, [])
 
 
-def both(earlier: Judged, later: Judged) -> Judged:
+def combined(earlier: Judged, later: Judged) -> Judged:
     """The judgement of two rounds, the later one with the accepted effects of the earlier in its model."""
     named, notes = [*earlier.named, *later.named], [*earlier.notes, *later.notes]
     missed: Verdict = "unknown" if earlier.verdict == "unknown" else later.verdict
@@ -69,22 +69,22 @@ def _tests(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory)
     """The tests of one examination."""
     choice = "proposed" if naming.named else "not proposed"
     score = "p-value of the largest score, corrected for all candidates"
-    said = [Decision(labels or "mismatch", score, naming.first_p, settings.SIGNIFICANCE, choice)]
+    decisions = [Decision(labels or "mismatch", score, naming.first_p, settings.SIGNIFICANCE, choice)]
     if pattern is not None:
         outcome = "significant" if pattern.significant else "not significant"
         test = "p-value of a nonparametric force, corrected for all tried"
-        said.append(Decision(pattern.force.label, test, pattern.p_value, settings.SIGNIFICANCE, outcome))
+        decisions.append(Decision(pattern.force.label, test, pattern.p_value, settings.SIGNIFICANCE, outcome))
     outcome = "correlated" if memory.correlated else "white"
     test = "p-value of white innovations"
-    return [*said, Decision("mismatch", test, memory.p_value, settings.RESIDUAL_LEVEL, outcome)]
+    return [*decisions, Decision("mismatch", test, memory.p_value, settings.RESIDUAL_LEVEL, outcome)]
 
 
 def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory) -> list[tuple[Decision, str]]:
     """Whether names explain too little of the mismatch beside a significant `pattern` or correlated innovations."""
-    said = []
+    doubts = []
 
     def tested(test: str, statistic: float, threshold: float, rejected: bool, note: str) -> None:
-        said.append((Decision(labels, test, statistic, threshold, "rejected" if rejected else "kept"), note))
+        doubts.append((Decision(labels, test, statistic, threshold, "rejected" if rejected else "kept"), note))
 
     if pattern is not None:
         lead = pattern.alone - naming.value
@@ -96,12 +96,12 @@ def _doubts(labels: str, naming: Naming, pattern: Pattern | None, memory: Memory
     for beside, share in shares.items():
         note = f"{labels} would explain {share:.0%} of the mismatch beside {beside}, too little for its cause."
         tested(f"share explained beside {beside}", share, settings.EXPLAINED, share < settings.EXPLAINED, note)
-    return said
+    return doubts
 
 
-def helped(judged: Judged, label: str, gain: Comparison) -> Judged:
+def with_gain(judged: Judged, label: str, gain: Comparison) -> Judged:
     """The verdict once it is known what is gained by an effect, or by several, of a `label`."""
-    notes, decisions = [*judged.notes, _gain_said(label, gain)], _decisions(label, gain)
+    notes, decisions = [*judged.notes, _sentence(label, gain)], _decisions(label, gain)
     return dataclasses.replace(judged, notes=notes, decisions=[*judged.decisions, *decisions])
 
 
@@ -111,22 +111,22 @@ def _decisions(label: str, gain: Comparison) -> list[Decision]:
     horizons = {"one step ahead": gain.one_step, "simulation": gain.simulation}
     test = "p-value of the gain in cross-validated log predictive density"
     level = settings.SIGNIFICANCE
-    said = [Decision(label, f"{test}, {name}", one.better, level, outcome) for name, one in horizons.items()]
+    decisions = [Decision(label, f"{test}, {name}", one.better, level, outcome) for name, one in horizons.items()]
     if gain.unlikelier:
         test = "gain in cross-validated log predictive density, one step ahead"
-        said.append(Decision(label, test, gain.one_step.total, -settings.CLEAR_LOG_BAYES, outcome))
+        decisions.append(Decision(label, test, gain.one_step.total, -settings.CLEAR_LOG_BAYES, outcome))
     if not gain.admissible:
-        said.append(Decision(label, "admissible and significant numbers", 0.0, 1.0, outcome))
-    return said
+        decisions.append(Decision(label, "admissible and significant numbers", 0.0, 1.0, outcome))
+    return decisions
 
 
-def _gain_said(label: str, gain: Comparison) -> str:
+def _sentence(label: str, gain: Comparison) -> str:
     if not gain.admissible:
         return f"{label} is rejected: its fitted numbers are not physically admissible, or not significant."
-    said = " and ".join(
+    gains = " and ".join(
         _horizon(*pair) for pair in (("one step ahead", gain.one_step), ("in simulation", gain.simulation))
     )
-    return f"{label} is {'accepted' if gain.accepted else 'rejected'}: blocks of the training runs {said}."
+    return f"{label} is {'accepted' if gain.accepted else 'rejected'}: blocks of the training runs {gains}."
 
 
 def _horizon(name: str, gain: Gain) -> str:
@@ -150,14 +150,14 @@ def by_fit(judged: Judged, share: float) -> Judged:
     return dataclasses.replace(judged, notes=[*judged.notes, f"Fitted, {labels} explains {share:.0%} of it."])
 
 
-def standing_in(judged: Judged, effects: Sequence[AbstractEffect]) -> Judged:
+def with_surrogate_note(judged: Judged, effects: Sequence[AbstractEffect]) -> Judged:
     """The verdict with a note on surrogate terms in the model."""
     labels = ", ".join(effect.label for effect in effects)
     note = f"Simulation errors are smaller with {labels}, a surrogate for unknown physics."
     return dataclasses.replace(judged, notes=[*judged.notes, note])
 
 
-def by_all(judged: Judged, pieces: int) -> Judged:
+def found_by_innovations(judged: Judged, pieces: int) -> Judged:
     """The verdict on effects found by innovations and accepted in simulation, re-initialised in `pieces` of a run."""
     note = "These effects were found by innovations, and are accepted together by the simulation error."
     if pieces > 1:
@@ -165,7 +165,7 @@ def by_all(judged: Judged, pieces: int) -> Judged:
     return dataclasses.replace(judged, notes=[*judged.notes, note])
 
 
-def idle(judged: Judged, label: str, others: Sequence[str], gain: Comparison) -> Judged:
+def without_effect(judged: Judged, label: str, others: Sequence[str], gain: Comparison) -> Judged:
     """The verdict less an effect that is not accepted any more beside `others`."""
     named = [one for one in judged.named if one.effect.label != label]
     judged = dataclasses.replace(judged, decisions=[*judged.decisions, *_decisions(label, gain)])
@@ -179,7 +179,7 @@ def replacing(judged: Judged, names: Sequence[str], effects: Sequence[str], gain
     return dataclasses.replace(judged, decisions=[*judged.decisions, *_decisions(label, gain)])
 
 
-def settled(judged: Judged, stand: list[Named]) -> Judged:
+def concluded(judged: Judged, stand: list[Named]) -> Judged:
     """The verdict once everything was tried: named by the accepted effects.
 
     Where none is accepted, a significant mismatch is unknown, and any other is none.

@@ -10,7 +10,7 @@ from rigs import driven, oscillator
 from scipy import stats
 
 from jaxsub.discrepancy.cross_validation import Comparison, Gain, Predicted, compare, gain, one_step_ahead, simulated
-from jaxsub.discrepancy.verdict import NOTHING, helped
+from jaxsub.discrepancy.verdict import NOTHING, with_gain
 from jaxsub.discrepancy.view import look
 from jaxsub.estimate import batch, fit
 from jaxsub.likelihood import BlockLinearised, whitened
@@ -66,7 +66,7 @@ def test_a_model_that_diverges_gains_nothing_and_one_that_does_no_more_gains():
     assert not compare(lost, lost).accepted
     assert compare(lost, fine).accepted
     assert not compare(lost, fine, admissible=False).accepted
-    said = helped(NOTHING, "cubic-damping[x]", compare(lost, fine))
+    said = with_gain(NOTHING, "cubic-damping[x]", compare(lost, fine))
     assert "diverge without it" in said.notes[0] and [one.outcome for one in said.decisions] == ["accepted"] * 2
 
 
@@ -86,7 +86,7 @@ def test_a_clear_loss_one_step_ahead_is_not_made_good_by_simulation(total, accep
     """Claim: what simulates better is rejected where its density one step ahead is clearly lower; a record says so."""
     found = Comparison(Gain(total, 0.8, 0.2), Gain(100.0, 1e-3, 0.999), 0.5, True)
     assert found.accepted is accepted
-    decisions = helped(NOTHING, "cubic-damping[x]", found).decisions
+    decisions = with_gain(NOTHING, "cubic-damping[x]", found).decisions
     assert decisions[-1].test.startswith("gain in") is not accepted
 
 

@@ -60,7 +60,7 @@ def test_where_a_free_run_asked_the_kind_is_what_it_asked_for():
     lag, drag = CONCEALED["actuator"], CONCEALED["structure"]
     scan = SimpleNamespace(value=np.array([900.0, 100.0]))
     selector = SimpleNamespace(
-        candidates=[lag, drag], value=lambda chosen: 0.0, freely_valued=lambda: (np.array([20.0, 800.0]), 10.0)
+        candidates=[lag, drag], value=lambda chosen: 0.0, evidence_in_simulation=lambda: (np.array([20.0, 800.0]), 10.0)
     )
 
     def first(again):
@@ -75,10 +75,10 @@ def test_evidence_of_a_free_run_with_one_candidate_is_that_of_its_block():
     """Claim: for all candidates at once it is what the block of each says by itself."""
     view = look(baseline(recorded(CONCEALED["sensor"], 5)[:2]))
     selector = listed(view, KINDS)
-    values, nothing = selector.freely_valued()
-    alone = [selector.free.log_evidence(selector.columns([i])) for i in range(len(selector.candidates))]
+    values, nothing = selector.evidence_in_simulation()
+    alone = [selector.simulation.log_evidence(selector.columns([i])) for i in range(len(selector.candidates))]
     np.testing.assert_allclose(values, np.array(alone) + selector.prior, rtol=1e-8, atol=1e-6)
-    assert nothing == selector.free.log_evidence([])
+    assert nothing == selector.simulation.log_evidence([])
 
 
 @pytest.mark.parametrize("disturbance", [None, (3.0, (0.5, 1.5), 3)], ids=["clean", "disturbed"])

@@ -15,8 +15,8 @@ class Simulated(Selector):
     """A selector of candidates that explain given shares of the simulation error."""
 
     def __init__(self, *shares):
-        self.candidates, self.freely, self.lost = [None] * len(shares), set(), False
-        self.of_free_run = lambda chosen: np.array(shares)
+        self.candidates, self.by_simulation, self.ignores_simulation = [None] * len(shares), set(), False
+        self.simulation_shares = lambda chosen: np.array(shares)
         self.value = lambda chosen: 0.0
         self.p_value = lambda index, scan: 1e-6
 
@@ -25,24 +25,24 @@ def test_a_candidate_of_the_simulation_error_precedes_one_that_explains_hardly_a
     """Claim: one of 1.6 % of the error gives way to 24 %, not to 10 %, nor to one without gain, nor once it is lost."""
     gains = lambda *values: Scan(np.array(values), np.zeros(len(values)), [], np.zeros(len(values)))
     selector = Simulated(0.016, 0.24, 0.3)
-    assert selector.foremost([], gains(137.0, 27.0, -1.0)) == 1
-    assert selector.freely == {1}
-    assert Simulated(0.016, 0.1).foremost([], gains(137.0, 27.0)) == 0
-    assert Simulated(0.05, 0.24).foremost([], gains(137.0, 27.0)) == 0
-    selector.lose_free_run()
-    assert selector.foremost([], gains(137.0, 27.0, -1.0)) == 0
-    assert selector.freely == set()
+    assert selector.next_candidate([], gains(137.0, 27.0, -1.0)) == 1
+    assert selector.by_simulation == {1}
+    assert Simulated(0.016, 0.1).next_candidate([], gains(137.0, 27.0)) == 0
+    assert Simulated(0.05, 0.24).next_candidate([], gains(137.0, 27.0)) == 0
+    selector.ignore_simulation()
+    assert selector.next_candidate([], gains(137.0, 27.0, -1.0)) == 0
+    assert selector.by_simulation == set()
 
 
 def test_rivals_of_what_simulation_selected_explain_as_much_of_its_error():
     """Claim: what explains less than half of its share, or leaves more than twice as much, is none of its rivals."""
     selector = Simulated(0.016, 0.24, 0.13, 0.11)
-    selector.freely.add(1)
-    assert selector.stand_in([], 1).tolist() == [False, True, True, False]
-    assert selector.stand_in([], 0).tolist() == [True] * 4
+    selector.by_simulation.add(1)
+    assert selector.alternatives_to([], 1).tolist() == [False, True, True, False]
+    assert selector.alternatives_to([], 0).tolist() == [True] * 4
     selector = Simulated(0.9, 0.7, 0.85)
-    selector.freely.add(0)
-    assert selector.stand_in([], 0).tolist() == [True, False, True]
+    selector.by_simulation.add(0)
+    assert selector.alternatives_to([], 0).tolist() == [True, False, True]
 
 
 def test_what_explains_most_of_a_large_simulation_error_is_significant():
@@ -52,9 +52,9 @@ def test_what_explains_most_of_a_large_simulation_error_is_significant():
     def most(gram, values, *shares):
         selector = Simulated(*shares)
         selector.evidence = SimpleNamespace(view=SimpleNamespace(disturbance=SimpleNamespace(noise=np.ones(2))))
-        selector.free = SimpleNamespace(gram=np.array([[gram]]), samples=10)
+        selector.simulation = SimpleNamespace(gram=np.array([[gram]]), samples=10)
         selector.scan = lambda chosen: gains(*values)
-        share = selector.ruling()
+        share = selector.majority_shares()
         return int(np.argmax(share)) if np.any(share) else None
 
     assert most(50.0, (137.0, 27.0, -1.0), 0.1, 0.54, 0.9) == 1
@@ -70,10 +70,10 @@ def test_what_explains_most_gives_way_to_a_nonparametric_force(monkeypatch, nonp
     path = sys.modules["jaxsub.discrepancy.acceptance"]
     monkeypatch.setattr(path, "most_explained", lambda *_: nonparametric)
     selector = Simulated(0.1, 0.7)
-    selector.ruling, selector.free = lambda: np.array([0.0, 0.7]), SimpleNamespace(disturbance=None)
+    selector.majority_shares, selector.simulation = lambda: np.array([0.0, 0.7]), SimpleNamespace(disturbance=None)
     found = object.__new__(Examination)
     named = SimpleNamespace(named=[SimpleNamespace(number=i) for i in chosen])
     for part, value in {"naming": named, "selector": selector, "view": None}.items():
         object.__setattr__(found, part, value)
     assert proposed_effects(found, Judged("unknown", [], 1e-9, [])) == expected
-    assert selector.freely == {*expected}
+    assert selector.by_simulation == {*expected}
