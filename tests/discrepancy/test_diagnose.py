@@ -12,7 +12,7 @@ from diagnosis_cases import INTERVAL, SAMPLES, SMALL, disturbed, recorded, requi
 
 from jaxsub.discrepancy import diagnose
 from jaxsub.discrepancy.locate import traces
-from jaxsub.discrepancy.next_run import next_run, said
+from jaxsub.discrepancy.next_run import next_run, sentence
 from jaxsub.discrepancy.view import look
 from jaxsub.effects import AbstractForce
 from jaxsub.effects.base import amplitude
@@ -120,7 +120,7 @@ def test_near_twins_are_ambiguous_with_their_rivals():
     planned = next_run(found, recorded(effect, 5)[:2])
     assert planned is not None
     assert planned.separation > planned.before
-    assert f"apart by {planned.separation:.3g} (χ²" in said(planned, "next.csv")
+    assert f"apart by {planned.separation:.3g} (χ²" in sentence(planned, "next.csv")
     assert planned.within <= 1.0 + 1e-9
 
 
