@@ -9,7 +9,7 @@ import numpy as np
 from . import settings
 from .acceptance import Model, fitted_model
 from .cross_validation import compare
-from .model import refit, wald_p_value
+from .model import p_value, refit, wald_p_value
 from .progress import Progress
 from .verdict import Judged, replacing
 from .view import look
@@ -25,8 +25,11 @@ def with_replacement(progress: Progress, model: Model, judged: Judged) -> tuple[
     fit = refit(model.fit, zero)
     fewer = fitted_model(fit, look(fit, model.view.disturbance), model.added)
     gain = compare(fewer.predicted, model.predicted)
-    judged = replacing(judged, names, [effect.label for effect in model.added if effect.replaces], gain)
-    return (model if gain.accepted or not fewer.significant else fewer), judged
+    # the effects are to be significant without the coefficients too
+    worst = max(p_value(fewer.view, effect) for effect in fewer.added) if fewer.admissible else 1.0
+    label = f"{', '.join(names)} beside {', '.join(effect.label for effect in model.added if effect.replaces)}"
+    judged = replacing(judged, label, gain, worst)
+    return (fewer if not gain.accepted and worst < settings.SIGNIFICANCE else model), judged
 
 
 def replaceable(model: Model) -> list[str]:

@@ -60,7 +60,7 @@ def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, w
     reduced = _reduced(problem, model.products, np.asarray(fit.pressed) != 0.0)
     if disturbance is None:
         disturbance = residual_disturbance(problem, model, reduced.directions, lambda share: watch(0.5 * share))
-    told = Progress(model.shares, lambda share: watch(0.5 + 0.5 * share))
+    done = Progress(model.shares, lambda share: watch(0.5 + 0.5 * share))
 
     def of(some: slice) -> np.ndarray:
         size = some.stop - some.start
@@ -69,7 +69,7 @@ def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, w
         for index in reversed(range(model.blocks)):
             block = model.block(number, index)
             adjoint = _back(problem, *block, reduced._replace(gain=gain), disturbance, adjoint)
-            told.of(some)(1.0 - index / model.blocks)
+            done.of(some)(1.0 - index / model.blocks)
         return np.asarray(_to_start(disturbance, adjoint))
 
     carried = np.sum(on_cores(of, [(some,) for some in model.shares]), axis=0)
@@ -80,13 +80,13 @@ class _Reduced(NamedTuple):
     """A fit's directions of unit information.
 
     `gain` (R, s, p) is how initial states follow the coefficients, `pinned` (p, p) the information of priors,
-    `directions` those that are identifiable and `untold` (p, p) the others.
+    `directions` those that are identifiable and `unidentifiable` (p, p) the others.
     """
 
     gain: Array
     pinned: Array
     directions: Directions
-    untold: Array
+    unidentifiable: Array
 
 
 @compiled
@@ -102,7 +102,7 @@ def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array
     across = turned @ mixed
     left = theta - across - jnp.swapaxes(across, 1, 2) + turned @ own @ gain
     pinned = jnp.sum(turned @ gain, axis=0) + jnp.diag(precision)
-    basis, untold = _directions(jnp.sum(left, axis=0) + pinned)
+    basis, unidentifiable = _directions(jnp.sum(left, axis=0) + pinned)
     values = problem.vehicle.values()
     at = [values[row.name] for row in problem.vehicle.layout.free]
     away = jnp.where(held, 0.0, problem.prior_mean - jnp.stack(at)) if at else jnp.zeros(0)
@@ -111,7 +111,7 @@ def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array
     # an unidentifiable direction has an empty column, and must not make the matrix of the others singular
     empty = jnp.all(basis == 0.0, axis=0)
     prior = prior.at[1:, 1:].add(jnp.diag(jnp.where(empty, 1.0, 0.0)))
-    return _Reduced(gain, pinned, Directions(held, basis, prior), untold)
+    return _Reduced(gain, pinned, Directions(held, basis, prior), unidentifiable)
 
 
 @compiled
@@ -135,8 +135,8 @@ _to_start = compiled(carried_to_start)
 
 def _sandwich(reduced: _Reduced, carried: Float[np.ndarray, "p p"]) -> Float[np.ndarray, "p p"]:
     """D = basis basisᵀ on either side of the scores' covariance, so that white noise alone gives D back."""
-    basis, untold, pinned = map(np.asarray, (reduced.directions.basis, reduced.untold, reduced.pinned))
-    return basis @ (basis.T @ (carried + pinned) @ basis) @ basis.T + untold @ untold.T
+    basis, unidentifiable, pinned = map(np.asarray, (reduced.directions.basis, reduced.unidentifiable, reduced.pinned))
+    return basis @ (basis.T @ (carried + pinned) @ basis) @ basis.T + unidentifiable @ unidentifiable.T
 
 
 def _directions(information: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array, "p p"]]:

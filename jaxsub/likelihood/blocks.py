@@ -90,10 +90,18 @@ class BlockLinearised(eqx.Module):
         `sigma` (c,) is the noise of the channels and `start_std` (s,) the prior deviation of initial states, both SI.
         `watch` is called with the share of the samples that is done.
         """
-        told = Progress(_shares(runs), watch)
+        done = Progress(_shares(runs), watch)
         length, short = block_length(vehicle, runs.share(_shares(runs)[0])), is_short(runs)
 
-        own = lambda some: (vehicle, runs.share(some), share_of(start, some), sigma, start_std, told.of(some), short)
+        own = lambda some: (
+            vehicle,
+            runs.share(some),
+            share_of(start, some),
+            sigma,
+            start_std,
+            done.of(some),
+            short,
+        )
         found = by_share(_linearised_share, own, *runs.times.shape)
         begins, kept, products, errors = zip(*found, strict=True)
         products, error = joined([*zip(products, errors, strict=True)], len(start))
@@ -167,9 +175,9 @@ def summed_products(
     watch: Watch = nobody,
 ) -> Float[Array, "r q q"]:
     """The `products` of `BlockLinearised` alone."""
-    told = Progress(_shares(runs), watch)
+    done = Progress(_shares(runs), watch)
 
-    own = lambda some: (vehicle, runs.share(some), share_of(start, some), sigma, start_std, told.of(some))
+    own = lambda some: (vehicle, runs.share(some), share_of(start, some), sigma, start_std, done.of(some))
     return jnp.asarray(joined(by_share(_summed_share, own, *runs.times.shape), len(start)))
 
 

@@ -43,9 +43,9 @@ class Progress:
         self._done = {some.start: 0.0 for some in every}
         self._watch, self._lock = watch, Lock()
 
-    def of(self, some: slice) -> "Told":
-        """To be called with how much of a share is done."""
-        return Told(self, some.start)
+    def of(self, some: slice) -> "ShareProgress":
+        """Called with how much of a share is done."""
+        return ShareProgress(self, some.start)
 
     def tell(self, first: int, part: float) -> None:
         """So much of the share that begins with the run `first` is done."""
@@ -54,8 +54,8 @@ class Progress:
             self._watch(sum(self._done.values()) / len(self._done))
 
 
-class Told:
-    """To be called with how much of a share is done; on a worker of a cluster it tells nobody."""
+class ShareProgress:
+    """Called with how much of a share is done; on a worker of a cluster nobody learns it."""
 
     def __init__(self, progress: Progress | None = None, first: int = 0):
         self._progress, self._first = progress, first
@@ -66,7 +66,7 @@ class Told:
             self._progress.tell(self._first, part)
 
     def __reduce__(self) -> tuple:
-        return Told, ()
+        return ShareProgress, ()
 
 
 def share_of(values: T, runs: slice) -> T:
