@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -140,9 +140,12 @@ def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple
     return EffectColumns(view, (*forces, *outputs)), owners
 
 
-def columns_of(view: View, forces: Sequence[np.ndarray], outputs: Sequence[np.ndarray] = ()) -> EffectColumns:
-    """Columns of forces at both ends of each interval, (2, R, K-1, n), then of changes of channels, (R, K, c), SI."""
-    return EffectColumns(view, tuple(map(Part.of, [*forces, *outputs])))
+def columns_of(view: View, forces: Iterable[np.ndarray], outputs: Iterable[np.ndarray] = ()) -> EffectColumns:
+    """Columns of forces at both ends of each interval, (2, R, K-1, n), then of changes of channels, (R, K, c), SI.
+
+    One after the other, since in all equations or channels they take several times the memory.
+    """
+    return EffectColumns(view, tuple(map(Part.of, itertools.chain(forces, outputs))))
 
 
 @quietly

@@ -220,7 +220,7 @@ def most_explained(view: View, disturbance: Disturbance) -> float:
     forces = smooth_forces(view)
     if not forces:
         return 0.0
-    drawn = columns_of(view, [column for force in forces for column in basis_forces(view, force, KNOTS)])
+    drawn = columns_of(view, (column for force in forces for column in basis_forces(view, force, KNOTS)))
     products = Evidence.of(view, drawn, [disturbance]).products[0]
     return float(np.max(products.explained([], _owners(forces, 0, KNOTS))))
 

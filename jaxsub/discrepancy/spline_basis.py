@@ -4,7 +4,7 @@ A missing force appears as a disturbance in a filter. The variable that it is a 
 the recordings by the others.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -65,12 +65,12 @@ def _predicted_share(view: View, force: SmoothForce, missing: np.ndarray) -> np.
     return 1.0 - left.sum(axis=0) / np.maximum(squares.sum(axis=0), 1e-300)
 
 
-def basis_forces(view: View, force: SmoothForce, knots: int) -> list[np.ndarray]:
+def basis_forces(view: View, force: SmoothForce, knots: int) -> Iterator[np.ndarray]:
     """The force of each hat function at both ends of each interval, (2, R, K-1, n)."""
     equations = view.vehicle.layout.equations
     own = np.eye(len(equations))[equations.index(force.equation)]
     drawn = hat_functions(_place(view, force), knots)
-    return [drawn[..., j, None] * own for j in range(knots)]
+    return (drawn[..., j, None] * own for j in range(knots))
 
 
 def hat_functions(place: np.ndarray, knots: int) -> np.ndarray:
