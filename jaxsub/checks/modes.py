@@ -54,13 +54,14 @@ def modes(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> list[Fin
     return findings
 
 
-def _mean_signals(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Float[np.ndarray, " m"]:
+def _mean_signals(vehicle: AbstractVehicle, recordings: Sequence[Recording]) -> Float[Array, " m"]:
     """Inputs at rest, surroundings at their mean."""
     layout = vehicle.layout
     surroundings = {column for _, column in layout.environment}
     columns = [*layout.held, *layout.interpolated]
     mean = lambda name: float(np.nanmean(np.concatenate([recording.columns[name] for recording in recordings])))
-    return np.array([mean(name) if name in surroundings else 0.0 for name in columns], jnp.result_type(float))
+    values = [mean(name) if name in surroundings else 0.0 for name in columns]
+    return jnp.asarray(np.array(values, jnp.result_type(float)))
 
 
 @compiled
