@@ -25,8 +25,8 @@ Given = Callable[[], tuple]
 LOCAL = "local"
 _PATIENCE = "5s"
 # settings of this process that every worker takes over, and those that one on the same machine can
-SAME = ("jax_enable_x64",)
-CACHE = (
+_SAME = ("jax_enable_x64",)
+_CACHE = (
     "jax_compilation_cache_dir",
     "jax_persistent_cache_min_compile_time_secs",
     "jax_persistent_cache_min_entry_size_bytes",
@@ -62,8 +62,7 @@ def working_on(address: str | None) -> Iterator[None]:
         yield
         return
     here = address == LOCAL
-    settings = tuple((name, getattr(jax.config, name)) for name in ((*SAME, *CACHE) if here else SAME))
-    ready = settings, kept_programs() if here else None, tuple(versions().items())
+    ready = tuple(settings_for(address).items()), kept_programs() if here else None, tuple(versions().items())
     with connected(address) as client:
 
         def called(function: Callable[..., R], arguments: Sequence[Given]) -> list[R]:
@@ -76,6 +75,12 @@ def working_on(address: str | None) -> Iterator[None]:
             yield
         finally:
             _Cluster.called = None
+
+
+def settings_for(address: str) -> dict[str, Any]:
+    """The settings of JAX here that workers at `address` take over."""
+    names = (*_SAME, *_CACHE) if address == LOCAL else _SAME
+    return {name: getattr(jax.config, name) for name in names}
 
 
 def _there(ready: tuple, packed: bytes) -> bytes:

@@ -16,7 +16,7 @@ from jaxsub.cli import terminal
 
 from ..cases import completed, read
 from .assemble import is_right, sets
-from .engine import engine
+from .engine import engine, other
 from .figures import draw
 from .plan import CONDITIONS, ordered
 from .work import work
@@ -38,10 +38,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="cases at once")
     chosen = parser.parse_args()
     today, which = engine(), "fresh" if chosen.fresh else "quick" if chosen.quick else "planned"
-    begun = {line["engine"]["commit"] for line in read(chosen.out / "cases.jsonl")
-             if line["engine"]["sources"] != today.sources}  # fmt: skip
-    if begun:
-        parser.error(f"{chosen.out} holds cases of the engine {begun.pop()}, and this is {today.commit}")
+    if begun := other(read(chosen.out / "cases.jsonl"), today):
+        parser.error(f"{chosen.out} holds cases of the engine {begun}, and this is {today.commit}")
     parts = [chosen.part] if chosen.part else CONDITIONS
     counts = {c: chosen.count or getattr(CONDITIONS[c], which) for c in parts}
     processes = {"jobs": chosen.jobs, "together": _CASES_A_PROCESS}

@@ -1,6 +1,7 @@
 """Which engine answers: a run of the battery has one, named by its commit."""
 
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +21,11 @@ class Engine(NamedTuple):
 def engine() -> Engine:
     """The engine that this process imports."""
     return Engine(_commit(Path(jaxsub.__file__).parent), sources()[:_DIGITS])
+
+
+def other(lines: Iterable[dict], today: Engine) -> str | None:
+    """The commit of an engine other than today's that answered some of the `lines` of a folder; None if none did."""
+    return next((line["engine"]["commit"] for line in lines if line["engine"]["sources"] != today.sources), None)
 
 
 def require(wanted: Engine) -> None:

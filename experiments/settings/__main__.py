@@ -15,7 +15,7 @@ from jaxsub.cli import session, terminal
 
 from ..cases import completed, read
 from ..concealed_physics import scoring
-from ..concealed_physics.engine import engine
+from ..concealed_physics.engine import engine, other
 from .assemble import assemble, said
 from .trials import CASES, QUICK, described, trials
 from .work import made, worked
@@ -37,9 +37,8 @@ def main() -> None:
     if unknown := sorted({*names} - {*every}):
         parser.error(f"settings.py has no {', '.join(unknown)}; it has {', '.join(every)}")
     today = engine()
-    begun = [line["engine"] for line in read(chosen.out / "cases.jsonl") if line["engine"]["sources"] != today.sources]
-    if begun:
-        parser.error(f"{chosen.out} holds cases of the engine {begun[0]['commit']}, and this is {today.commit}")
+    if begun := other(read(chosen.out / "cases.jsonl"), today):
+        parser.error(f"{chosen.out} holds cases of the engine {begun}, and this is {today.commit}")
     session.start()
     todo = trials(QUICK if chosen.quick else CASES, names)
     for case in {trial.case for trial in todo}:

@@ -28,8 +28,8 @@ def with_replacement(progress: Progress, model: Model, judged: Judged) -> tuple[
     # the effects are to be significant without the coefficients too
     worst = max(p_value(fewer.view, effect) for effect in fewer.added) if fewer.admissible else 1.0
     label = f"{', '.join(names)} beside {', '.join(effect.label for effect in model.added if effect.replaces)}"
-    judged = replacing(judged, label, gain, worst)
-    return (fewer if not gain.accepted and worst < settings.SIGNIFICANCE else model), judged
+    held = not gain.accepted and worst < settings.SIGNIFICANCE
+    return (fewer if held else model), replacing(judged, label, gain, worst, "held at zero" if held else "kept")
 
 
 def replaceable(model: Model) -> list[str]:

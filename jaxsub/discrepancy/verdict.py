@@ -173,13 +173,12 @@ def without_effect(judged: Judged, label: str, others: Sequence[str], gain: Comp
     return dataclasses.replace(judged, verdict=_certainty(named), named=named, notes=[*judged.notes, note])
 
 
-def replacing(judged: Judged, label: str, gain: Comparison, p_value: float) -> Judged:
+def replacing(judged: Judged, label: str, gain: Comparison, p_value: float, outcome: str) -> Judged:
     """The judgement on coefficients of the baseline beside effects that replace them, all in the `label`.
 
     By what is gained with the coefficients, and the largest `p_value` of an effect without them.
     """
-    without = "held at zero" if not gain.accepted and p_value < settings.SIGNIFICANCE else "kept"
-    own = Decision(label, "largest p-value of an effect without them", p_value, settings.SIGNIFICANCE, without)
+    own = Decision(label, "largest p-value of an effect without them", p_value, settings.SIGNIFICANCE, outcome)
     return dataclasses.replace(judged, decisions=[*judged.decisions, *_decisions(label, gain), own])
 
 

@@ -18,9 +18,7 @@ time limit is a worker that dies, which costs the chunks that it was at.
 
 from collections.abc import Iterator, Sequence
 
-import jax
-
-from ..workers import CACHE, LOCAL, SAME, connected, distributed
+from ..workers import connected, distributed, settings_for
 from .plan import Chunk, Plan
 from .run import Answers
 
@@ -35,8 +33,7 @@ def on_cluster(plan: Plan, chunks: Sequence[Chunk], address: str) -> Iterator[tu
     from .worker import Prepared, run_there
 
     with connected(address) as client:
-        settings = SAME if address != LOCAL else (*SAME, *CACHE)
-        plugin = Prepared(plan, {name: getattr(jax.config, name) for name in settings})
+        plugin = Prepared(plan, settings_for(address))
         client.register_plugin(plugin)
         # all at once, so that a cluster that grows with its work sees how much there is
         submitted = [client.submit(run_there, plugin.name, chunk, pure=False) for chunk in chunks]

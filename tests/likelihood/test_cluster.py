@@ -3,29 +3,22 @@
 import os
 import signal
 import threading
-import time
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from commands import environment
+from clusters import at_work, distributed, two_workers
 from rigs import oscillator, recorded
 
 from jaxsub.estimate import estimate_disturbance
 from jaxsub.likelihood import Disturbance, blocks, filter_runs, output_errors, part_products, run_shares
 from jaxsub.workers import working_on
 
-distributed = pytest.importorskip("distributed")
-
 
 @pytest.fixture
 def cluster(tmp_path_factory, monkeypatch):
-    """Two worker processes, which a nanny starts again where they die."""
-    for name, value in environment(tmp_path_factory.mktemp("cache")).items():
-        monkeypatch.setenv(name, value)
-    settings = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": 50}
-    with distributed.LocalCluster(processes=True, **settings) as started:
+    with two_workers(tmp_path_factory.mktemp("cache"), monkeypatch) as started:
         yield started
 
 
@@ -38,11 +31,8 @@ class Killer(threading.Thread):
 
     def run(self):
         with distributed.Client(self.cluster, set_as_default=False) as client:
-            pids = client.run(os.getpid)
-            while not self.at:
-                time.sleep(0.02)
-                worker, self.at = max(client.processing().items(), key=lambda item: len(item[1]))
-            os.kill(pids[worker], signal.SIGKILL)
+            pid, self.at = at_work(client)
+            os.kill(pid, signal.SIGKILL)
 
 
 def answers(runs):

@@ -4,27 +4,20 @@ import os
 import signal
 import socket
 import threading
-import time
 
 import dask
 import jax
 import pytest
-from commands import environment
+from clusters import at_work, distributed, two_workers
 from sweep_cases import farthest, plan
 
 from jaxsub.errors import InputError
 from jaxsub.sweeps import sweep
 
-distributed = pytest.importorskip("distributed")
-
 
 @pytest.fixture
 def cluster(tmp_path_factory, monkeypatch):
-    """Two worker processes, which a nanny starts again where they die."""
-    for name, value in environment(tmp_path_factory.mktemp("cache")).items():
-        monkeypatch.setenv(name, value)
-    settings = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
-    with distributed.LocalCluster(processes=True, **settings) as started:
+    with two_workers(tmp_path_factory.mktemp("cache"), monkeypatch) as started:
         yield started
 
 
@@ -38,13 +31,10 @@ class Killer(threading.Thread):
     def run(self):
         # a default client would serve the sweep too
         with distributed.Client(self.cluster, set_as_default=False) as client:
-            pids = client.run(os.getpid)
-            while not self.at:
-                time.sleep(0.02)
-                worker, self.at = max(client.processing().items(), key=lambda item: len(item[1]))
-            os.kill(pids[worker], signal.SIGSTOP)
+            pid, self.at = at_work(client)
+            os.kill(pid, signal.SIGSTOP)
             self.kept.wait(timeout=300.0)
-            os.kill(pids[worker], signal.SIGKILL)
+            os.kill(pid, signal.SIGKILL)
 
     def progress(self, done, total):
         if done and not self.kept.is_set():
