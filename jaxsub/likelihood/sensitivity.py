@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 from ..programs import compiled
 from ..recording.runs import Runs
-from ..simulation import Sampled, sampled_states
+from ..simulation import LinearisedStep, Sampled, Slopes, linearised_step, sampled_states
 from ..vehicle import AbstractVehicle
 from .output_error import first_turns, wrapped_errors
 
@@ -99,8 +99,7 @@ def jacobians(
     with_theta = lambda vector: vehicle.with_values(dict(zip(names, vector, strict=True)))
     before = before[:, :-1]
     r, k1, s = before.shape
-    p, n = len(names), len(vehicle.layout.equations)
-    basis = jnp.eye(p + s + 2 * n)
+    p = len(names)
     live = runs.live.reshape(-1)[:, None, None]
 
     def ready(parameters: Array) -> tuple[Sampled, Array]:
@@ -109,17 +108,13 @@ def jacobians(
 
     # the weights of a step have derivatives by the parameters alone, which all samples share
     of = lambda tangent: jax.jvp(ready, (theta,), (tangent,))
-    (model, nodes), (by_model, by_nodes) = jax.vmap(of, out_axes=(None, 0))(basis[:, :p])
-    numbers, rest = eqx.partition(model, eqx.is_inexact_array)
-    tangents = (eqx.filter(by_model, eqx.is_inexact_array), basis[:, p : p + s], basis[:, p + s :].reshape(-1, 2, n))
+    (model, nodes), (by_model, by_nodes) = jax.vmap(of, out_axes=(None, 0))(jnp.eye(p))
 
-    def stepped(sample: tuple[Array, ...]) -> Float[Array, "s q"]:
+    def stepped(sample: tuple[Array, ...]) -> LinearisedStep:
         state, node, by_node, index, push = sample
-        step = lambda numbers, state, node, push: eqx.combine(numbers, rest).step(state, node, index, push)
-        along = lambda numbers_, state_, push_, node_: jax.jvp(
-            step, (numbers, state, node, push), (numbers_, state_, node_, push_)
-        )[1]
-        return jax.vmap(along, out_axes=-1)(*tangents, by_node)
+        # the weights of one length alone are the same for all samples, whose products with them are then one
+        index = index if len(runs.steps) > 1 else jnp.asarray(0)
+        return linearised_step(model, state, node, index, push, Slopes(by_model, by_node))
 
     flat = lambda array: array.reshape(r * k1, *array.shape[2:])
     by_nodes = jnp.moveaxis(by_nodes, 0, 2)
@@ -127,15 +122,14 @@ def jacobians(
     # a remainder would be compiled apart, in as much time again
     whole = -(-r * k1 // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
     samples = jax.tree.map(lambda a: jnp.pad(a, [(0, whole - r * k1), *[(0, 0)] * (a.ndim - 1)], mode="edge"), samples)
-    columns = jax.lax.map(stepped, samples, batch_size=_SIDE_BY_SIDE)[: r * k1]
+    step = jax.tree.map(lambda a: a[: r * k1], jax.lax.map(stepped, samples, batch_size=_SIDE_BY_SIDE))
 
     def shown(change: Array) -> Array:
         parameters, moved = jnp.split(change, [p])
         return with_theta(theta + parameters).measure(runs.times, at + moved, runs.signals)
 
-    F, A, G = jnp.split(columns, [p, p + s], axis=-1)
-    A = jnp.where(live, A, jnp.eye(s)).reshape(r, k1, s, s)
-    G, F = (jnp.where(live, M, 0.0).reshape(r, k1, s, M.shape[-1]) for M in (G, F))
+    A = jnp.where(live, step.A, jnp.eye(s)).reshape(r, k1, s, s)
+    G, F = (jnp.where(live, M, 0.0).reshape(r, k1, s, M.shape[-1]) for M in (step.G, step.F))
     outputs, by_change = value_and_columns(shown, jnp.zeros(p + s))
     direct, C = jnp.split(by_change, [p], axis=-1)
     return Jacobians(A, G, C, F, direct, outputs)

@@ -37,6 +37,19 @@ class Sampled(eqx.Module):
         table = step_table(inverse @ vehicle.damping_matrix(), runs.steps / runs.substeps)
         return cls(vehicle, inverse, table, runs.substeps)
 
+    def rates(
+        self, state: Float[Array, " s"], signals: Float[Array, " m"], extra: Float[Array, " n"] | float = 0.0
+    ) -> Float[Array, " s"]:
+        """Rates of the `state` (s,) without the velocities' linear part, SI.
+
+        `signals` (m,) are the inputs, SI, and `extra` (n,) a generalised force more, N or N m.
+        """
+        n = len(self.inverse)
+        motion = self.vehicle.motion(state, signals)
+        moved = stack(self.vehicle.position_rates(motion), self.vehicle.layout.positions, state[0])
+        rate = self.inverse @ (self.vehicle.force(motion) + extra)
+        return jnp.concatenate([rate if self.rest is None else rate + self.rest @ state[:n], moved])
+
     def step(
         self,
         state: Float[Array, " s"],
@@ -59,10 +72,8 @@ class Sampled(eqx.Module):
         @jax.jit
         def rates(velocity: Array, position: Array, node: Array) -> tuple[Array, Array]:
             signals, force = (node, 0.0) if extra is None else (node[:-n], node[-n:])
-            motion = self.vehicle.motion(jnp.concatenate([velocity, position]), signals)
-            moved = stack(self.vehicle.position_rates(motion), self.vehicle.layout.positions, velocity[0])
-            rate = self.inverse @ (self.vehicle.force(motion) + force)
-            return rate if self.rest is None else rate + self.rest @ velocity, moved
+            rate = self.rates(jnp.concatenate([velocity, position]), signals, force)
+            return rate[:n], rate[n:]
 
         def advance(carry: tuple[Array, Array], part: Array) -> tuple[tuple[Array, Array], None]:
             return exponential_step(rates, weights, *carry, part), None
@@ -71,7 +82,7 @@ class Sampled(eqx.Module):
         if self.substeps == 1:
             carry, _ = advance(carry, full)
         else:
-            carry, _ = jax.lax.scan(advance, carry, _subdivide(full, self.substeps))
+            carry, _ = jax.lax.scan(advance, carry, subdivided(full, self.substeps))
         return jnp.concatenate(carry)
 
     def states(
@@ -96,7 +107,7 @@ def parabola(s: Float[Array, " *k"]) -> Float[Array, "*k 3"]:
     return jnp.stack([(1.0 - s) * (1.0 - 2.0 * s), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], axis=-1)
 
 
-def _subdivide(nodes: Float[Array, "3 m"], parts: int) -> Float[Array, "q 3 m"]:
+def subdivided(nodes: Float[Array, "3 m"], parts: int) -> Float[Array, "q 3 m"]:
     """Nodes of `parts` equal pieces of the interval, on the parabola through the three given."""
     fine = parabola(jnp.arange(2 * parts + 1, dtype=nodes.dtype) / (2.0 * parts)) @ nodes
     return fine[2 * jnp.arange(parts)[:, None] + jnp.arange(3)]
