@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 from ..programs import compiled
 from ..recording.runs import Runs
-from ..simulation import LinearisedStep, Sampled, Slopes, linearised_step, sampled_states
+from ..simulation import Sampled, Slopes, linearised_step, sampled_states
 from ..vehicle import AbstractVehicle
 from .output_error import first_turns, wrapped_errors
 
@@ -110,11 +110,13 @@ def jacobians(
     of = lambda tangent: jax.jvp(ready, (theta,), (tangent,))
     (model, nodes), (by_model, by_nodes) = jax.vmap(of, out_axes=(None, 0))(jnp.eye(p))
 
-    def stepped(sample: tuple[Array, ...]) -> LinearisedStep:
+    def stepped(sample: tuple[Array, ...]) -> Float[Array, "s q"]:
         state, node, by_node, index, push = sample
         # the weights of one length alone are the same for all samples, whose products with them are then one
         index = index if len(runs.steps) > 1 else jnp.asarray(0)
-        return linearised_step(model, state, node, index, push, Slopes(by_model, by_node))
+        step = linearised_step(model, state, node, index, push, Slopes(by_model, by_node))
+        # side by side, since where nothing is free an array of no columns would have no batches
+        return jnp.concatenate([step.A, step.G, step.F], axis=-1)
 
     flat = lambda array: array.reshape(r * k1, *array.shape[2:])
     by_nodes = jnp.moveaxis(by_nodes, 0, 2)
@@ -122,14 +124,15 @@ def jacobians(
     # a remainder would be compiled apart, in as much time again
     whole = -(-r * k1 // _SIDE_BY_SIDE) * _SIDE_BY_SIDE
     samples = jax.tree.map(lambda a: jnp.pad(a, [(0, whole - r * k1), *[(0, 0)] * (a.ndim - 1)], mode="edge"), samples)
-    step = jax.tree.map(lambda a: a[: r * k1], jax.lax.map(stepped, samples, batch_size=_SIDE_BY_SIDE))
+    columns = jax.lax.map(stepped, samples, batch_size=_SIDE_BY_SIDE)[: r * k1]
 
     def shown(change: Array) -> Array:
         parameters, moved = jnp.split(change, [p])
         return with_theta(theta + parameters).measure(runs.times, at + moved, runs.signals)
 
-    A = jnp.where(live, step.A, jnp.eye(s)).reshape(r, k1, s, s)
-    G, F = (jnp.where(live, M, 0.0).reshape(r, k1, s, M.shape[-1]) for M in (step.G, step.F))
+    A, G, F = jnp.split(columns, [s, s + push.shape[-1] * 2], axis=-1)
+    A = jnp.where(live, A, jnp.eye(s)).reshape(r, k1, s, s)
+    G, F = (jnp.where(live, M, 0.0).reshape(r, k1, s, M.shape[-1]) for M in (G, F))
     outputs, by_change = value_and_columns(shown, jnp.zeros(p + s))
     direct, C = jnp.split(by_change, [p], axis=-1)
     return Jacobians(A, G, C, F, direct, outputs)
