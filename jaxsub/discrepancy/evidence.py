@@ -42,7 +42,7 @@ class Evidence:
 
     **Fields**
 
-    - `columns`: of the q candidates. `length`: (q,) that of each under the view's disturbance, of which `products` have
+    - `columns`: of the q candidates. `length`: (q,) that of each under the first disturbance, of which `products` have
       them in units.
     - `varied`: (v,) the free numbers that may differ by run, among those of the view.
     - `shares`: the residual's, the free parameters' and the candidates' columns of shares of the runs, placed where
@@ -65,13 +65,12 @@ class Evidence:
         varied: Sequence[int] = (),
     ) -> "Evidence":
         """Under the given disturbances, or shares of the view's."""
-        own, known = view.disturbance, len(view.prior)
+        first, *more = disturbances or with_smaller(view.disturbance)
         raw = cls(view, columns, np.ones(len(columns)), [], _kept(view, columns), tuple(varied))
-        first = raw.under(own)
-        length = root_or_one(np.diag(first.gram)[known:])
-        made = dataclasses.replace(raw, length=length)
-        for disturbance in disturbances or with_smaller(own):
-            made.products.append(first.scaled(made._unit) if disturbance is own else made.under(disturbance))
+        products = raw.under(first)
+        made = dataclasses.replace(raw, length=root_or_one(np.diag(products.gram)[len(view.prior) :]))
+        made.products.append(products.scaled(made._unit))
+        made.products.extend(made.under(disturbance) for disturbance in more)
         return made
 
     @property

@@ -1,12 +1,12 @@
 """The nonparametric force that explains most: a smooth function of one variable in one equation.
 
 All variables and equations are screened by how well they predict the estimated disturbance in cross-validation. The
-evidence of the best few of each equation is then computed.
+evidence of the best variable of each equation is then computed, and of the next few of the equation where it is most.
 """
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import special
@@ -98,24 +98,27 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     left = chosen.left(columns, under[-1])
     system = chosen.within(columns, under[-1]).view.followed.system
     mean, _ = smoothed(under[-1].disturbance, system, left)
-    weighed = promising_forces(view, forces, np.asarray(mean))
-    disturbances = [one for products in under for one in with_smaller(products.disturbance)]
-    # one force after the other: products between forces are not needed
     picked = chosen.columns.picked([c for c in columns if c < len(chosen.columns)])
-    beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))
-    made = (Evidence.of(view, beside(force), disturbances, chosen.varied) for force in weighed)
     varying = [c - len(chosen.columns) for c in columns if c >= len(chosen.columns)]
-    every = [_Weighed(found.products, found.length, len(picked), varying) for found in made]
-    values = [each.values(each.held) for each in every]
-    best = int(np.argmax([np.max(each) for each in values]))
-    found, at = every[best], int(np.argmax(values[best]))
-    gain = float(np.max(values[best])) - found.before
+    beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))
+
+    def weighed(force: SmoothForce, among: Sequence[Products]) -> _Weighed:
+        disturbances = [one for products in among for one in with_smaller(products.disturbance)]
+        found = Evidence.of(view, beside(force), disturbances, chosen.varied)
+        return _Weighed(found.products, found.length, len(picked), varying)
+
+    # one force after the other: products between forces are not needed
+    best = strongest(promising_forces(view, forces, np.asarray(mean)), lambda force: weighed(force, under[-1:]).value)
+    found = weighed(best, under)
+    values = found.values(found.held)
+    at = int(np.argmax(values))
+    gain = float(np.max(values)) - found.before
     p_value = min(1.0, 0.5 * len(forces) * len(settings.LENGTH_SCALES) * float(special.chdtrc(1, 2.0 * max(0.0, gain))))
     # the prior standard deviation counts as one parameter, and every force is equally probable a priori
     alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
     heights, size, explained = found.heights(at)
-    predicts = found.predicts(dataclasses.replace(chosen, columns=beside(weighed[best]), length=found.unit, shares=()))
-    force = dataclasses.replace(weighed[best], spread=float(f"{size:.6g}"))
+    predicts = found.predicts(dataclasses.replace(chosen, columns=beside(best), length=found.unit, shares=()))
+    force = dataclasses.replace(best, spread=float(f"{size:.6g}"))
     force, near = found.nearest(at, force, heights)
     return Pattern(force, heights, near, p_value, predicts, alone, explained)
 
@@ -161,6 +164,11 @@ class _Weighed:
         """Log evidence with the force more than the columns `held`, under each disturbance."""
         gain = lambda p: smoothest(p, held, self.own, self.length).gain
         return np.array([p.log_evidence(held) + gain(p) for p in self.products])
+
+    @property
+    def value(self) -> float:
+        """The largest log evidence with the force."""
+        return float(np.max(self.values(self.held)))
 
     def together(self, products: Products) -> tuple[Products, np.ndarray, Smooth]:
         """Products of the chosen columns and of those of the force's prior, the sums they are of, and the function."""
@@ -213,6 +221,14 @@ class _Weighed:
         lost = float((heights - C @ few) @ G @ (heights - C @ few))
         numbers = {f"a_{j}": float(a) for j, a in enumerate(few)}
         return with_numbers(force, numbers), 1.0 - lost / max(squares, 1e-300)
+
+
+def strongest(ranked: Sequence[Sequence[SmoothForce]], value: Callable[[SmoothForce], float]) -> SmoothForce:
+    """The force of largest `value` in the equation whose first force has the largest."""
+    first = [value(own[0]) for own in ranked]
+    best = int(np.argmax(first))
+    own = ranked[best]
+    return own[int(np.argmax([first[best], *map(value, own[1:])]))]
 
 
 def most_explained(view: View, disturbance: Disturbance) -> float:

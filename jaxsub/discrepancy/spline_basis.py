@@ -35,18 +35,21 @@ def smooth_forces(view: View) -> list[SmoothForce]:
     return found
 
 
-def promising_forces(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) -> list[SmoothForce]:
-    """Of each equation's forces those that predict most of the `missing` force (R, K, n) in cross-validation."""
+def promising_forces(view: View, forces: Sequence[SmoothForce], missing: np.ndarray) -> list[list[SmoothForce]]:
+    """Of each equation's forces those that predict most of the `missing` force (R, K, n), the best first.
+
+    They predict blocks of it by the others (cross-validation).
+    """
     equations = view.vehicle.layout.equations
-    predicted = {}
-    for force in {force.variable: force for force in forces}.values():
-        predicted[force.variable] = dict(zip(equations, _predicted_share(view, force, missing), strict=True))
-    chosen: list[SmoothForce] = []
-    for equation in equations:
+    shares = {
+        force.variable: _predicted_share(view, force, missing) for force in forces if force.equation == equations[0]
+    }
+    ranked = []
+    for place, equation in enumerate(equations):
         own = [force for force in forces if force.equation == equation]
-        ranked = sorted(own, key=lambda force: -predicted[force.variable][force.equation])
-        chosen += ranked[: 1 + settings.ALTERNATIVES]
-    return chosen
+        own.sort(key=lambda force, place=place: -shares[force.variable][place])
+        ranked.append(own[: 1 + settings.ALTERNATIVES])
+    return ranked
 
 
 def _predicted_share(view: View, force: SmoothForce, missing: np.ndarray) -> np.ndarray:
