@@ -17,8 +17,8 @@ import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
 from ..arrays import Values
+from .coordinates import Expansion
 from .curvature import over_unit_diagonal
-from .problem import Expansion
 
 _FIRST, _LEAST, _MOST = 1e-3, 1e-10, 1e12
 
@@ -42,7 +42,8 @@ class State(eqx.Module):
 class Damped(optx.AbstractMinimiser):
     r"""Minimises what `expand(args, y)` gives to second order; the function itself is not called.
 
-    Ends where the full step promises a gain below `tolerance`, or below a `share` of what was gained so far:
+    Ends where the full step promises a gain below `tolerance`, or below a `share` of what was gained so far, by as much
+    as the last step kept of its promise:
     $\tfrac12 g^TH^{-1}g$ is half the squared distance to the optimum in standard errors, so 1e-5 stops within 0.005 of
     one, whatever the units. A trial that is not finite is refused, so only a start that does not run ends as
     `nonfinite`; where no step however short is better the search ends as `nonlinear_divergence`. An entry that presses
@@ -97,6 +98,8 @@ class Damped(optx.AbstractMinimiser):
         damping = jnp.maximum(_LEAST, state.damping * factor)
         y = chosen(state.trial, y)
         trial, promised, decrement = self._next(args, y, at, damping)
+        # where curvature is of an average, or not that of the way there, steps keep a part of what they promise
+        decrement = decrement * jnp.where(good & ~state.fresh, jnp.minimum(gain, 1.0), 1.0)
         # a start that does not run gives nothing to go by, and ends the search
         decrement = jnp.where(state.fresh & ~finite, jnp.nan, decrement)
         growth = chosen(2.0, 2.0 * state.growth)

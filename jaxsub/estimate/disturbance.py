@@ -22,12 +22,12 @@ from jaxtyping import Array, Float
 
 from ..arrays import Values, namespace, quietly
 from ..likelihood import Averages, Columns, Disturbance, System, covariance_derivatives, restricted, shares
-from ..likelihood.disturbance import steps
+from ..likelihood.disturbance import disturbed, steps
 from ..likelihood.innovation_products import Begun, Steps, innovation_products, products_adjoint, products_and_begun
 from ..programs import compiled
 from ..workers import on_workers
+from .coordinates import Expansion
 from .damped import Damped, State
-from .problem import Expansion
 
 R = TypeVar("R")
 # calls a function with each part of the recordings and with what is given beside it by the part's number
@@ -200,12 +200,10 @@ def _back(part: Averages, y: Array, begun: Begun, slope: Float[Array, "q q"]) ->
     `slope` is the cost's derivative by the products of all shares.
     """
 
-    def posed(y: Array, residual: Array) -> tuple[Steps, Array]:
-        shown = jnp.asarray(part.columns.shown).at[..., 0].set(residual)
-        return steps(_at(y, part), part.system, Columns(shown, part.columns.forcing))
-
-    (at, _), pull = jax.vjp(posed, y, jnp.asarray(part.columns.shown)[..., 0])
-    gradient, error = pull(products_adjoint(at, begun, slope, jnp.ones(())))
+    (F, B, noise, _), pull = jax.vjp(lambda y: disturbed(_at(y, part), part.system), y)
+    at = Steps(F, B, part.system.C, noise, part.columns.shown, part.columns.forcing)
+    *by, error = products_adjoint(at, begun, slope, jnp.ones(()))
+    (gradient,) = pull(tuple(by))
     more = _derivatives(y, part, error)
     return gradient, innovation_products(*steps(_at(y, part), part.system, part.columns + more))[0]
 

@@ -29,8 +29,9 @@ from .innovation_products import Steps, beyond, innovation_products, passes, pro
 from .run_shares import by_share, share_of
 from .sensitivity import Jacobians, Linearised, propagate
 
-# columns from which their number is padded to a multiple of so many
-_WIDE, _STEP = 256, 64
+# columns that the narrowest programs take, since fewer take hardly less time; and those from which their number is
+# padded to a multiple of so many
+_LEAST, _WIDE, _STEP = 32, 256, 64
 
 
 class Disturbance(eqx.Module):
@@ -173,14 +174,15 @@ def total_products(
 
 
 def padded_width(count: int) -> int:
-    """The least of 16, 24, 32, 48, 64, 96 … 256 and multiples of 64 that is not less than `count`.
+    """The least of 32, 48, 64, 96 … 256 and multiples of 64 that is not less than `count`.
 
-    At most half as many more, and few where the products of very many columns with each other take most of the time.
+    But for the least, at most half as many more; few where the products of very many columns with each other take
+    most of the time.
     """
     if count > _WIDE:
         return -(-count // _STEP) * _STEP
-    power = max(16, 1 << (max(count, 1) - 1).bit_length())
-    return 3 * power // 4 if count <= 3 * power // 4 and power > 16 else power
+    power = max(_LEAST, 1 << (max(count, 1) - 1).bit_length())
+    return 3 * power // 4 if count <= 3 * power // 4 and power > _LEAST else power
 
 
 @compiled
@@ -192,10 +194,17 @@ def _part_products(
 
 def steps(disturbance: Disturbance, system: System, columns: Columns) -> tuple[Steps, Float[Array, "z z"]]:
     """What a filter of the disturbed system needs at each sample, and the covariance of [x, d] that it begins with."""
+    F, B, noise, begin = disturbed(disturbance, system)
+    return Steps(F, B, system.C, noise, columns.shown, columns.forcing), begin
+
+
+def disturbed(
+    disturbance: Disturbance, system: System
+) -> tuple[Float[Array, "r k z z"], Float[Array, "r k z n"], Float[Array, "r k c"], Float[Array, "z z"]]:
+    """What of `steps` depends on the disturbance: F, B, the channels' noise, and the covariance at the start."""
     F, B = transition(disturbance, system)
     noise = jnp.where(system.measured, disturbance.noise, 1.0) ** 2
-    begin = jnp.diag(jnp.concatenate([system.start_std, disturbance.force]) ** 2)
-    return Steps(beyond(F), beyond(B), system.C, noise, columns.shown, columns.forcing), begin
+    return beyond(F), beyond(B), noise, jnp.diag(jnp.concatenate([system.start_std, disturbance.force]) ** 2)
 
 
 def transition(disturbance: Disturbance, system: System) -> tuple[Float[Array, "r k1 z z"], Float[Array, "r k1 z n"]]:

@@ -1,4 +1,4 @@
-r"""The Kalman filter of many columns at once, and products of their innovations with an exact derivative.
+r"""The Kalman filter of many columns at once, and products of their innovations with exact derivatives.
 
 All columns share the covariance, so one pass filters them side by side. A search for noise that makes them probable
 wants the derivative by F, B and the noise of every sample; reverse differentiation of the pass would solve with the
@@ -9,7 +9,7 @@ $\Lambda_f = F^T\Lambda F$ before it and $\bar G$ of the products $G = \sum E^Tu
 $\bar E = K^T\lambda_f + u(\bar G + \bar G^T),\quad
 \bar S = K^T\Lambda_fK - \mathrm{sym}(K^T\lambda_fu^T) - \tfrac12u(\bar G + \bar G^T)u^T + \tfrac12\bar sS^{-1}$
 
-and P, X, C take their shares of these. Source: de Jong (1991), Ann. Statist. 19, for many columns at once.
+and P, X take their shares of these. Source: de Jong (1991), Ann. Statist. 19, for many columns at once.
 """
 
 from collections.abc import Callable
@@ -170,7 +170,6 @@ def _sample(run: Steps, k: Array) -> Steps:
     return at._replace(F=seen(at.F, 0.0), C=seen(at.C, 0.0), noise=seen(at.noise, 1.0), shown=seen(at.shown, 0.0))
 
 
-@jax.custom_vjp
 def innovation_products(steps: Steps, begin: Float[Array, "z z"]) -> tuple[Float[Array, "q q"], Float[Array, ""]]:
     """Products of the whitened innovations of all columns, and half the log-determinant of their covariance."""
     return products_and_begun(steps, begin)[0]
@@ -186,10 +185,24 @@ def products_and_begun(steps: Steps, begin: Float[Array, "z z"]) -> tuple[tuple[
     return (jnp.sum(gram, (0, 1)), jnp.sum(log_determinant)), jax.tree.map(lambda M: M[:, 0], begun)
 
 
+class Derivatives(NamedTuple):
+    """Derivatives of a function of `innovation_products`.
+
+    **Fields**: by F, B and noise of the `Steps` and by the covariance that they `begin` with; `residual`: (R, K, c) by
+    what the first column shows.
+    """
+
+    F: Float[Array, "r k z z"]
+    B: Float[Array, "r k z n"]
+    noise: Float[Array, "r k c"]
+    begin: Float[Array, "z z"]
+    residual: Float[Array, "r k c"]
+
+
 def products_adjoint(
     steps: Steps, begun: Begun, by_gram: Float[Array, "q q"], by_log_determinant: Float[Array, ""]
-) -> tuple[Steps, Float[Array, "z z"]]:
-    """Derivatives by the steps and by the covariance at the start, from those by both of `innovation_products`.
+) -> Derivatives:
+    """The derivatives of a function that has these by both of `innovation_products`.
 
     Piece by piece from the last: what a piece met is worked out again from where it begins.
     """
@@ -197,15 +210,18 @@ def products_adjoint(
     samples, (z, q) = steps.noise.shape[1], begun[1].shape[-2:]
     pieces, length = _cut(samples, 1)
 
-    def of_run(run: Steps, begun: tuple[Array, Array]) -> tuple[Steps, Array]:
-        def piece(after: tuple[Array, Array], each: tuple[Array, tuple]) -> tuple[tuple[Array, Array], Steps]:
+    def of_run(run: Steps, begun: tuple[Array, Array]) -> tuple[tuple[Array, ...], Array]:
+        def piece(after: tuple[Array, Array], each: tuple[Array, tuple]) -> tuple[tuple[Array, Array], tuple]:
             first, before = each
             at = jax.vmap(lambda k: _sample(run, k))(first + jnp.arange(length))
             passed = jax.lax.scan(_met, before, at)[1]
+            u, *solved = _solved(passed)
+            # of all samples at once: one large product
+            pull = (u.reshape(-1, q) @ both).reshape(u.shape)
             return jax.lax.scan(
-                lambda carry, each: _back_step(carry, *each, both, log_determinant),
+                lambda carry, each: _back_step(carry, *each, log_determinant),
                 after,
-                (at, passed, *_solved(passed)),
+                (at, passed, u, *solved, pull),
                 reverse=True,
             )
 
@@ -214,9 +230,8 @@ def products_adjoint(
         (_, weight), found = jax.lax.scan(piece, nothing, (firsts, begun), reverse=True)
         return jax.tree.map(lambda M: M.reshape(-1, *M.shape[2:])[:samples], found), weight
 
-    found, weights = jax.vmap(of_run)(steps, begun)
-    forcing = None if found.forcing is None else found.forcing[:, :-1]
-    return found._replace(forcing=forcing), jnp.sum(weights, axis=0)
+    (F, B, noise, residual), weights = jax.vmap(of_run)(steps, begun)
+    return Derivatives(F, B, noise, jnp.sum(weights, axis=0), residual)
 
 
 def _solved(passed: Passed) -> tuple[Array, Array, Array]:
@@ -236,34 +251,22 @@ def _back_step(
     u: Array,
     gain: Array,
     inverse: Array,
-    both: Array,
+    pull: Array,
     log_determinant: Array,
-) -> tuple[tuple[Array, Array], Steps]:
-    """The adjoints before a sample by those after it, and the derivatives by what the filter needs there."""
+) -> tuple[tuple[Array, Array], tuple[Array, Array, Array, Array]]:
+    """The adjoints before a sample by those after it, and the derivatives by F, B, noise and residual there."""
     lever, weight = carry
     s = at.C.shape[1]
     filtered = passed.X + passed.half.T @ passed.white, passed.P - passed.half.T @ passed.half
     left, weighed = at.F.T @ lever, at.F.T @ weight
-    of_F = lever @ filtered[0].T + 2.0 * weight @ at.F @ filtered[1]
-    of_B, of_forcing = 2.0 * weight @ at.B, None if at.forcing is None else -lever[:s]
+    of_F, of_B = lever @ filtered[0].T + 2.0 * weight @ at.F @ filtered[1], 2.0 * weight @ at.B
     weight = weighed @ at.F
     weighted, kept = gain @ left, gain @ weight
-    pull = u @ both
     of_E = weighted + pull
     mixed = (weighted + 0.5 * pull) @ u.T
     of_S = kept @ gain.T - 0.5 * (mixed + mixed.T) + 0.5 * log_determinant * inverse
     of_across = (u @ left.T - 2.0 * kept).at[:, :s].add(of_S @ at.C)
-    across = passed.factor @ passed.half
-    of_C = of_across @ passed.P[:s].T + of_S @ across[:, :s] - of_E @ passed.X[:s].T
     share = at.C.T @ of_across
     weight = weight.at[:s].add(0.5 * share).at[:, :s].add(0.5 * share.T)
     lever = left.at[:s].add(-at.C.T @ of_E)
-    return (lever, weight), Steps(of_F, of_B, of_C, jnp.diagonal(of_S), of_E, of_forcing)
-
-
-def _forth(steps: Steps, begin: Array) -> tuple[tuple[Array, Array], tuple[Steps, Begun]]:
-    found, begun = products_and_begun(steps, begin)
-    return found, (steps, begun)
-
-
-innovation_products.defvjp(_forth, lambda kept, given: products_adjoint(*kept, *given))
+    return (lever, weight), (of_F, of_B, jnp.diagonal(of_S), of_E[:, 0])

@@ -5,7 +5,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsub.likelihood.innovation_products import Steps, innovation_products, passes
+from jaxsub.likelihood.innovation_products import (
+    Derivatives,
+    Steps,
+    innovation_products,
+    passes,
+    products_adjoint,
+    products_and_begun,
+)
 
 R, K, Z, N, C, S, Q = 2, 6, 5, 2, 3, 3, 4
 
@@ -67,28 +74,40 @@ def test_products_are_those_of_the_dense_gaussian():
     assert float(found[1]) == pytest.approx(spread, rel=1e-12)
 
 
+def by_adjoint(steps: Steps, begin: jax.Array) -> Derivatives:
+    """The derivatives of `weighed` by the adjoint."""
+    weights = jnp.asarray(np.random.default_rng(12).normal(size=(Q, Q)))
+    _, begun = products_and_begun(steps, begin)
+    return products_adjoint(steps, begun, weights, jnp.asarray(1.7))
+
+
 @pytest.mark.parametrize("samples", [K, 150])
 @pytest.mark.parametrize("forced", [True, False])
 def test_the_adjoint_is_reverse_differentiation(forced, samples):
-    """Claim: the derivative by every part of the system, in one piece or more, is JAX's through the filter itself."""
+    """Claim: the derivatives by dynamics, noise, start and residual are JAX's, in one piece of a run or in more."""
     given = some_steps(forced, samples)
-    ours = jax.grad(weighed)(given, innovation_products)
     steps, begin = jax.grad(weighed)(given, plainly)
-    for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves((steps, symmetric(begin))), strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-11)
+    theirs = steps.F, steps.B, steps.noise, symmetric(begin), steps.shown[..., 0]
+    for ours, own in zip(by_adjoint(*given), theirs, strict=True):
+        np.testing.assert_allclose(ours, own, rtol=1e-9, atol=1e-11)
 
 
 def test_the_adjoint_agrees_with_differences():
-    """Claim: along random directions of the whole system the derivative is the central difference."""
-    given = some_steps(forced=True)
-    slopes = jax.grad(weighed)(given, innovation_products)
+    """Claim: along random directions of dynamics, noise, start and residual it is the central difference."""
+    steps, begin = some_steps(forced=True)
+    slopes = by_adjoint(steps, begin)
     rng = np.random.default_rng(13)
     for _ in range(3):
-        steps, begin = jax.tree.map(lambda leaf: jnp.asarray(rng.normal(size=leaf.shape)), given)
-        way = (steps, symmetric(begin))
-        up, down = (jax.tree.map(lambda a, b, h=h: a + h * b, given, way) for h in (1e-6, -1e-6))
-        difference = (weighed(up, innovation_products) - weighed(down, innovation_products)) / 2e-6
-        slope = sum(jnp.sum(a * b) for a, b in zip(jax.tree.leaves(slopes), jax.tree.leaves(way), strict=True))
+        way = Derivatives(*(jnp.asarray(rng.normal(size=slope.shape)) for slope in slopes))
+        way = way._replace(begin=symmetric(way.begin))
+
+        def moved(h, way=way):
+            shown = steps.shown.at[..., 0].add(h * way.residual)
+            parts = {name: getattr(steps, name) + h * getattr(way, name) for name in ("F", "B", "noise")}
+            return weighed((steps._replace(shown=shown, **parts), begin + h * way.begin), innovation_products)
+
+        difference = (moved(1e-6) - moved(-1e-6)) / 2e-6
+        slope = sum(jnp.sum(a * b) for a, b in zip(slopes, way, strict=True))
         assert float(slope) == pytest.approx(float(difference), rel=1e-6)
 
 
@@ -97,7 +116,7 @@ def test_memory_of_the_adjoint_is_that_of_the_steps():
 
     def memory(samples: int) -> tuple[int, int]:
         given = some_steps(False, samples)
-        compiled = jax.jit(jax.grad(lambda given: weighed(given, innovation_products))).lower(given).compile()
+        compiled = jax.jit(by_adjoint).lower(*given).compile()
         used = compiled.memory_analysis()
         assert used is not None
         return used.temp_size_in_bytes, sum(leaf.nbytes for leaf in jax.tree.leaves(given))
