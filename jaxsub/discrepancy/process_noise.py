@@ -200,7 +200,6 @@ def floor(vehicle: AbstractVehicle, sigma: Float[Values, " c"]) -> Float[Values,
     return _FLOOR * state_scale(vehicle, sigma)[: len(vehicle.layout.equations)]
 
 
-@compiled
 def noise_densities(
     vehicle: AbstractVehicle,
     runs: Runs,
@@ -213,7 +212,15 @@ def noise_densities(
     `start` is the state at each run's first sample, `sigma` the sensors' noise, both SI, and `draws` the copies' noise
     in units of it; NaN once a filter diverged.
     """
-    outputs = jnp.concatenate([simulate(vehicle, runs, start) + sigma * draws, runs.outputs[None]])
+    return _densities(vehicle, runs, start, sigma, simulate(vehicle, runs, start), draws)
+
+
+@compiled
+def _densities(
+    vehicle: AbstractVehicle, runs: Runs, start: Array, sigma: Array, clean: Array, draws: Values
+) -> tuple[Float[Array, "m r k n"], Float[Array, "r k n"]]:
+    """`noise_densities` by the `clean` outputs (R, K, c), which a program of their own gives."""
+    outputs = jnp.concatenate([clean + sigma * draws, runs.outputs[None]])
     filter, beneath = noise_filter(vehicle, runs.substeps, sigma), floor(vehicle, sigma)
 
     def step(state: FilterState, sample: Sample) -> tuple[FilterState, Array]:

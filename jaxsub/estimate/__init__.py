@@ -4,6 +4,7 @@ from .assessment import LEVEL, Assessment, ChannelResidual, assess, assess_resid
 from .batches import batch, side_by_side
 from .between_runs import RunValues
 from .combined import Chain, Global
+from .coordinates import Coordinates, Expansion
 from .dead_reckoning import Outage, Track, kinematic_filter, model_filter, tracks_of
 from .disturbance import estimate_disturbance, estimate_disturbance_at_once
 from .filtered import Filtered
@@ -14,7 +15,7 @@ from .method import AbstractMethod, Found, Iterative, Passes, by_cost
 from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, newton, newton_eq10
 from .path_disturbance import disturbance_along
 from .posterior_draws import posterior
-from .problem import Expansion, Problem, require_free
+from .problem import Problem, require_free
 from .restarted_searches import race, with_estimated_spreads
 from .search_ends import Ends, ends
 from .starts import Basin, Rate, basins, scattered, success
@@ -28,6 +29,7 @@ __all__ = [
     "Basin",
     "Chain",
     "ChannelResidual",
+    "Coordinates",
     "Ends",
     "Expansion",
     "Filtered",

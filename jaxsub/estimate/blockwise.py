@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 from ..arrays import Values
 from ..programs import compiled
 from ..results import RESULTS
+from .coordinates import Coordinates
 from .damped import Damped, State
 from .method import Found, Iterative, Passes, by_cost, from_start, unwatched
 from .pool import ending
@@ -28,6 +29,7 @@ class Descent:
 
     def __init__(self, method: "GaussNewton", problem: Problem, start: Float[Values, " d"]):
         self._solver, self._method, self.problem = method.solver, method, problem
+        self._space = problem.without_vehicle
         self._y = self._trial = jax.device_put(np.asarray(start))
         self._state: State | None = None
         self._decrements: list[float] = []
@@ -51,8 +53,8 @@ class Descent:
         share = lambda part: tell(self.passes + part, expected)
         gram = self.problem.products_in_blocks(self._trial, share)
         if self._state is None:
-            self._state = self._solver.begin(self._y, eqx.filter_eval_shape(self.problem.expansion, self._y, gram))
-        self._y, self._state, done, self._result = _step(self._solver, self.problem, self._y, self._state, gram)
+            self._state = self._solver.begin(self._y, eqx.filter_eval_shape(self._space.expansion, self._y, gram))
+        self._y, self._state, done, self._result = _step(self._solver, self._space, self._y, self._state, gram)
         self._decrements.append(float(self._state.decrement))
         self._costs.append(self.cost)
         crawls = self.passes > _ROUND and self._costs[-1 - _ROUND] - self.cost < self._method.least
@@ -106,11 +108,11 @@ def raced(searches: Sequence[Descent], tell: Passes = unwatched) -> Descent:
 
 @compiled
 def _step(
-    solver: Damped, problem: Problem, y: Array, state: State, gram: Float[Array, "r q q"]
+    solver: Damped, space: Coordinates, y: Array, state: State, gram: Float[Array, "r q q"]
 ) -> tuple[Array, State, Bool[Array, ""], RESULTS]:
     """A step of `solver` by the products at the trial, and whether and how the search ends there."""
-    y, state = solver.follow(y, problem, state, problem.expansion(state.trial, gram))
-    done, result = solver.terminate(None, y, problem, {}, state, frozenset())
+    y, state = solver.follow(y, space, state, space.expansion(state.trial, gram))
+    done, result = solver.terminate(None, y, space, {}, state, frozenset())
     result, done = ending(y, done, RESULTS.promote(result))
     return y, state, done, result
 

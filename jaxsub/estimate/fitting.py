@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from ..arrays import Values, quietly
 from ..filter.vehicle import unfilterable
@@ -29,16 +29,14 @@ from .between_runs import (
     wide_spreads,
     with_spreads,
 )
-from .curvature import decoupled
 from .method import AbstractMethod, Passes, unwatched
 from .methods import filtered_first, gauss_newton
+from .optimum import inertia, statistics_at_end
 from .problem import Problem
 
 _CONCENTRATIONS = 12
 # of a standard deviation, a change that ends its estimation
 _SETTLED = 0.003
-# standard errors from an optimum that is none
-_MATTERS = 0.1
 
 
 class AbstractSearchEnd(eqx.Module):
@@ -319,82 +317,9 @@ def evaluate(ended: AbstractSearchEnd, watch: Watch = nobody) -> Solution:
         return ended
     problem = ended.problem
     model = BlockLinearised.of(ended.vehicle, ended.runs, ended.start, ended.sigma, problem.start_std, watch)
-    covariance, gradient, pressed, result = _statistics(problem, model.products, ended.result)
+    covariance, gradient, pressed, result = statistics_at_end(
+        problem.without_vehicle, problem.values, inertia(problem.vehicle), model.products, ended.result
+    )
     fields = {field.name: getattr(ended, field.name) for field in dataclasses.fields(ended)}
     fields["result"] = result
     return Solution(**fields, covariance=covariance, model=model, gradient_norm=gradient, pressed=pressed)
-
-
-@compiled
-def _statistics(
-    problem: Problem, products: Float[Array, "r q q"], result: RESULTS
-) -> tuple[Array, Array, Array, RESULTS]:
-    """Covariance of the free parameters, gradient in standard errors, bound that each presses on, judged `result`."""
-    information, gradient = information_matrix(problem, products)
-    rows, values = problem.vehicle.layout.free, problem.vehicle.values()
-    at = jnp.array([values[row.name] for row in rows])
-    lower, upper = (jnp.array([getattr(row, side) for row in rows]) for side in ("lower", "upper"))
-    room = jnp.where(gradient > 0.0, upper - at, at - lower)
-    away = standard_errors_away(information, gradient, room)
-    pressed = jnp.where(is_pressed(information, room), jnp.sign(gradient), 0.0)
-    # others' errors are for what presses on a bound held there; its own is the curvature's, which is no interval
-    covariance = inverse_information(decoupled(information, pressed != 0.0))
-    own = inverse_information(information)
-    covariance = jnp.where(jnp.diag(pressed != 0.0), own, covariance)
-    farthest = jnp.max(away, initial=0.0)
-    return covariance, farthest, pressed, judged(problem.vehicle, farthest, result)
-
-
-def inverse_information(information: Float[Array, "p p"]) -> Float[Array, "p p"]:
-    """The covariance that the information allows: a direction without any gets no false certainty elsewhere."""
-    size = jnp.sqrt(jnp.maximum(jnp.diag(information), 1e-300))
-    # a pseudo-inverse in equilibrated coordinates
-    values, vectors = jnp.linalg.eigh(information / jnp.outer(size, size))
-    inverse = (vectors / jnp.maximum(values, 1e-14)) @ vectors.T
-    return inverse / jnp.outer(size, size)
-
-
-def standard_errors_away(
-    information: Float[Array, "p p"], gradient: Float[Array, " p"], room: Float[Array, " p"]
-) -> Float[Array, " p"]:
-    """How many standard errors a Newton step from here would move each parameter, no further than bounds allow.
-
-    What presses on a bound, with less `room` downhill than matters, stays.
-    """
-    pressed = is_pressed(information, room)
-    covariance = inverse_information(decoupled(information, pressed))
-    step = jnp.abs(covariance @ jnp.where(pressed, 0.0, gradient))
-    return step / jnp.sqrt(jnp.maximum(jnp.diag(covariance), 1e-300))
-
-
-def is_pressed(information: Float[Array, "p p"], room: Float[Array, " p"]) -> Bool[Array, " p"]:
-    """Which parameters have less `room` downhill than matters beside their standard errors, others known."""
-    return room * jnp.sqrt(jnp.diag(information)) < _MATTERS
-
-
-def judged(vehicle: AbstractVehicle, away: Float[Array, ""], result: RESULTS) -> RESULTS:
-    """`result`, unless the inertia is not positive definite or the end is 0.1 standard errors off an optimum."""
-    inertia = vehicle.mass_matrix()
-    definite = jnp.all(jnp.linalg.eigvalsh(0.5 * (inertia + inertia.T)) > 0.0)
-    result = RESULTS.where((result == RESULTS.successful) & ~(away < _MATTERS), RESULTS.not_stationary, result)
-    return RESULTS.where(definite, result, RESULTS.indefinite_inertia)
-
-
-def information_matrix(
-    problem: Problem, products: Float[Array, "r q q"]
-) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:
-    r"""Fisher information of the free parameters (physical units) with the initial states eliminated, and the gradient.
-
-    $I = \sum_r J_\theta^T J_\theta - J_\theta^T J_x (J_x^T J_x + 1)^{-1} J_x^T J_\theta$ plus the prior's, with $J_x$
-    by initial states in units of their spread, so that a known one, which has none, drops out. `products` are those of
-    `BlockLinearised`.
-    """
-    p = len(problem.prior_mean)
-    own = products[:, p:-1, p:-1] + jnp.eye(len(problem.start_std))
-    mixed = products[:, :p, p:-1]
-    gain = jnp.linalg.solve(own, jnp.swapaxes(mixed, 1, 2))
-    information = jnp.sum(products[:, :p, :p] - mixed @ gain, 0) + jnp.diag(problem.prior_std**-2.0)
-    values = problem.vehicle.values()
-    at = [values[row.name] for row in problem.vehicle.layout.free]
-    pull = (jnp.stack(at) - problem.prior_mean) / problem.prior_std**2 if at else jnp.zeros(0)
-    return information, jnp.sum(products[:, :p, -1], axis=0) - pull

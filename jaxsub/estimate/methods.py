@@ -8,6 +8,7 @@ from ..filter.ekf import ExtendedKalmanFilter
 from ..filter.mekf import ModifiedKalmanFilter
 from .blockwise import GaussNewton
 from .combined import Chain
+from .coordinates import Coordinates
 from .damped import Damped
 from .filtered import Filtered
 from .method import Iterative
@@ -22,7 +23,7 @@ def gauss_newton(tolerance: float = 1e-5) -> GaussNewton:
 
     It ends where a step promises to lower the cost by less than `tolerance`.
     """
-    return GaussNewton(Damped(Problem.expand, tolerance, within=Problem.bounds), 60)
+    return GaussNewton(Damped(Problem.expand, tolerance, within=Coordinates.bounds), 60)
 
 
 @functools.cache
@@ -31,7 +32,7 @@ def newton(tolerance: float = 1e-5) -> Iterative:
 
     It ends where a step promises to lower the cost by less than `tolerance`.
     """
-    return Iterative(Damped(Problem.expand_exactly, tolerance, within=Problem.bounds), 60)
+    return Iterative(Damped(Problem.expand_exactly, tolerance, within=Coordinates.bounds), 60)
 
 
 @functools.cache

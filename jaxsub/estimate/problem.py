@@ -2,13 +2,13 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from ..arrays import quietly
@@ -21,7 +21,7 @@ from ..parameters import Transform
 from ..programs import compiled
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
-from .curvature import Arrow
+from .coordinates import Coordinates, Expansion, has_bounds
 from .initial_states import initial_guess
 from .newton_raphson import second_order
 
@@ -29,32 +29,19 @@ from .newton_raphson import second_order
 _NEAR = 0.1
 
 
-class Problem(eqx.Module):
+class Problem(Coordinates):
     """Free parameters and initial states of R runs as one vector, and its whitened residuals.
 
-    **Fields**
+    **Fields** beside those of `Coordinates`
 
     - `vehicle`: its free numbers are where the search starts. `runs`: the recordings.
     - `sigma`: (c,) noise of each channel, SI.
-    - `transform`: of the free parameters; `origin`: (p,) the coordinates where they start.
-    - `moving`: (p,) false for a coordinate that stays where it starts.
-    - `prior_mean`, `prior_std`: (p,) of the parameters, SI; the latter infinite where there is none.
-    - `guess`: (R, s) and `start_std`: (s,) Gaussian prior of the initial states, SI; of a known one it is zero.
-    - `known_start`: whether initial states are known, and no coordinates.
     - `march`: where there is one, cost and expansion come from compiled C, and have no further derivatives.
     """
 
     vehicle: AbstractVehicle
     runs: Runs
     sigma: Float[Array, " c"]
-    transform: Transform
-    origin: Float[Array, " p"]
-    moving: Bool[Array, " p"]
-    prior_mean: Float[Array, " p"]
-    prior_std: Float[Array, " p"]
-    guess: Float[Array, "r s"]
-    start_std: Float[Array, " s"]
-    known_start: bool = eqx.field(static=True)
     march: March | None = eqx.field(static=True, default=None)
 
     @classmethod
@@ -93,15 +80,27 @@ class Problem(eqx.Module):
             }
         )
         return cls(
-            vehicle,
-            runs,
-            jnp.asarray(sigma),
-            transform,
-            transform.to_free(transform.centre),
+            vehicle=vehicle,
+            runs=runs,
+            sigma=jnp.asarray(sigma),
+            transform=transform,
+            origin=transform.to_free(transform.centre),
             guess=guess if start is None else start,
             known_start=known_start,
+            bounded=has_bounds(rows),
             **arrays,
         )
+
+    @property
+    def values(self) -> Float[Array, " p"]:
+        """The vehicle's free numbers, SI."""
+        values = self.vehicle.values()
+        return jax.device_put(np.array([float(values[row.name]) for row in self.vehicle.layout.free]))
+
+    @property
+    def without_vehicle(self) -> Coordinates:
+        """The coordinates alone."""
+        return Coordinates(**{field.name: getattr(self, field.name) for field in dataclasses.fields(Coordinates)})
 
     def in_c(self) -> "Problem":
         """The same problem on compiled C: for many searches, or one that is waited for.
@@ -114,25 +113,20 @@ class Problem(eqx.Module):
         march = March(free.vehicle_at, (near(), near()), self.runs, start=not self.known_start)
         return dataclasses.replace(self, march=march)
 
-    @compiled
     def split(self, y: Float[Array, " d"]) -> tuple[AbstractVehicle, Float[Array, "r s"]]:
         """The vehicle and the initial states that the coordinates `y` stand for."""
-        return self.vehicle_at(y[: len(self.prior_mean)]), self.guess + self.start_std * self.moved(y)
+        theta, start, _ = self.without_vehicle.physical(y)
+        return self._vehicle_with(theta), start
 
     def vehicle_at(self, y: Float[Array, " p"]) -> AbstractVehicle:
         """The vehicle that the coordinates `y` of the parameters stand for."""
+        return self._vehicle_with(self.theta(y))
+
+    def _vehicle_with(self, theta: Float[Array, " p"]) -> AbstractVehicle:
+        # by NumPy: to cut an array of JAX would be a program for each place
+        each = theta if isinstance(theta, Tracer) else jax.device_put([*np.asarray(theta)])
         names = [row.name for row in self.vehicle.layout.free]
-        theta = self.transform.to_physical(jnp.where(self.moving, y, self.origin))
-        return self.vehicle.with_values(dict(zip(names, theta, strict=True)))
-
-    def moved(self, y: Float[Array, " d"]) -> Float[Array, "r s"]:
-        """How far the initial states at `y` are from their guess, in their spreads."""
-        states = y[len(self.prior_mean) :]
-        return jnp.zeros_like(self.guess) if self.known_start else states.reshape(self.guess.shape)
-
-    def coordinates(self) -> Float[Array, " d"]:
-        """The coordinates of the start."""
-        return jnp.pad(self.origin, (0, 0 if self.known_start else self.guess.size))
+        return self.vehicle.with_values(dict(zip(names, each, strict=True)))
 
     def coordinates_of(self, vehicle: AbstractVehicle, start: Float[Array, "r s"]) -> Float[Array, " d"]:
         """The coordinates of the numbers of `vehicle` and the initial states `start`; known ones have none."""
@@ -143,48 +137,21 @@ class Problem(eqx.Module):
         moved = (start - self.guess) / jnp.where(self.start_std > 0.0, self.start_std, 1.0)
         return self.at(theta).at[len(theta) :].set(jnp.where(self.start_std > 0.0, moved, 0.0).ravel())
 
-    def at(self, theta: Float[Array, " p"]) -> Float[Array, " d"]:
-        """The coordinates of the physical parameters `theta` and the guessed initial states."""
-        return self.coordinates().at[: len(theta)].set(self.transform.to_free(theta))
-
-    def bounds(self) -> Callable[[Array, Array], tuple[Array, Array]] | None:
-        """`along`, if any free number has a bound."""
-        rows = self.vehicle.layout.free
-        return self.along if any(math.isfinite(row.lower) or math.isfinite(row.upper) for row in rows) else None
-
-    def along(self, y: Float[Array, " d"], step: Float[Array, " d"]) -> tuple[Float[Array, " d"], Float[Array, " d"]]:
-        """Where a `step` of the values leads from the coordinates `y`, and how much of it, as bounds allow."""
-        p = len(self.prior_mean)
-        theta, part = self.transform.stepped(y[:p], step[:p])
-        return jnp.concatenate([theta, y[p:] + step[p:]]), jnp.concatenate([part, step[p:]])
-
     def residuals(self, y: Float[Array, " d"]) -> Float[Array, " m"]:
         """Whitened errors of the outputs at the coordinates `y` (d,), then of the priors."""
-        return jnp.concatenate([_outputs(self, y, jnp.zeros(len(self.start_std))).ravel(), _prior(self, y)])
+        return jnp.concatenate([_outputs(self, y, jnp.zeros(len(self.start_std))).ravel(), self.prior(y)])
 
     def cost(self, y: Float[Array, " d"]) -> Float[Array, ""]:
         r"""$\tfrac12\sum$ residuals² at the coordinates `y` (d,): minus the log-likelihood, up to its constant."""
         if self.march is None:
             return 0.5 * jnp.sum(self.residuals(y) ** 2)
-        start = self.guess + self.start_std * self.moved(y)
-        squares = self.march.squares(self.vehicle_at, y[: len(self.prior_mean)], start, self.runs, self.sigma)
-        return 0.5 * (jnp.sum(squares) + jnp.sum(_prior(self, y) ** 2))
+        squares = self.march.squares(self.vehicle_at, y[: len(self.prior_mean)], self.start(y), self.runs, self.sigma)
+        return 0.5 * (jnp.sum(squares) + jnp.sum(self.prior(y) ** 2))
 
     @compiled
-    def expand(self, y: Float[Array, " d"]) -> "Expansion":
+    def expand(self, y: Float[Array, " d"]) -> Expansion:
         """The cost about `y` to second order, its curvature by Gauss and Newton: $J^TJ$."""
         return self.expansion(y, self.products(y))
-
-    def expansion(self, y: Float[Array, " d"], gram: Float[Array, "r q q"]) -> "Expansion":
-        """`expand` by `gram` (R, q, q), the `products` at `y`."""
-        p, s = len(self.prior_mean), 0 if self.known_start else len(self.start_std)
-        prior, slopes = value_and_columns(lambda theta: _prior(self, y.at[:p].set(theta))[:p], y[:p])
-        among = jnp.sum(gram[:, :p, :p], axis=0) + slopes.T @ slopes
-        curvature = Arrow(among, gram[:, :p, p:-1], gram[:, p:-1, p:-1] + jnp.eye(s)) if s else among
-        by_theta = jnp.sum(gram[:, :p, -1], axis=0) + slopes.T @ prior
-        by_start = gram[:, p:-1, -1].ravel() + y[p:]
-        cost = 0.5 * (jnp.sum(gram[:, -1, -1]) + jnp.sum(prior**2) + jnp.sum(y[p:] ** 2))
-        return Expansion(cost, jnp.concatenate([by_theta, by_start]), curvature)
 
     def products(self, y: Float[Array, " d"]) -> Float[Array, "r q q"]:
         """Products of each run's whitened columns at `y` (d,): by the parameters, its own initial state, and the error.
@@ -195,8 +162,7 @@ class Problem(eqx.Module):
         p, s = len(self.prior_mean), 0 if self.known_start else len(self.start_std)
         still = jnp.zeros(len(self.start_std))
         if self.march is not None:
-            start = self.guess + self.start_std * self.moved(y)
-            return self.march.products(self.vehicle_at, y[:p], start, self.start_std, self.runs, self.sigma)
+            return self.march.products(self.vehicle_at, y[:p], self.start(y), self.start_std, self.runs, self.sigma)
 
         def shown(change: Array) -> Array:
             return _outputs(self, y.at[:p].add(change[:p]), still.at[:s].add(change[p:]))
@@ -211,16 +177,17 @@ class Problem(eqx.Module):
 
         `watch` is called with the share of the samples that is done.
         """
-        vehicle, start, scale = _split(self, y)
+        theta, start, scale = self.without_vehicle.physical(y)
         # by NumPy, for which no program has to be made
         scale = np.asarray(scale)
+        vehicle = self._vehicle_with(theta)
         gram = np.asarray(summed_products(vehicle, self.runs, start, self.sigma, self.start_std, watch))
         p, q = len(self.prior_mean), len(scale)
         kept = np.array([*range(p), q - 1]) if self.known_start else np.arange(q)
         return jax.device_put((scale[:, None] * gram * scale)[:, kept[:, None], kept])
 
     @compiled
-    def expand_exactly(self, y: Float[Array, " d"]) -> "Expansion":
+    def expand_exactly(self, y: Float[Array, " d"]) -> Expansion:
         """The cost about `y` to second order, its curvature exact."""
         cost, gradient, hessian, _ = second_order(lambda y, _: (self.cost(y), None), y, None)
         return Expansion(cost, gradient, hessian)
@@ -232,42 +199,8 @@ def require_free(vehicle: AbstractVehicle, where: str) -> None:
         raise InputError(where, "all coefficients are fixed, so there is nothing to fit", "leave at least one free")
 
 
-class Expansion(eqx.Module):
-    """A cost to second order about a point, in the coordinates of a problem.
-
-    **Fields**
-
-    - `cost`: ½ Σ whitened residuals². `gradient`: (d,) by the coordinates.
-    - `curvature`: (d, d) by the coordinates, or the parts of that.
-    """
-
-    cost: Float[Array, ""]
-    gradient: Float[Array, " d"]
-    curvature: Arrow | Float[Array, "d d"]
-
-    @property
-    def hessian(self) -> Float[Array, "d d"]:
-        """The curvature with all of its zeros."""
-        return self.curvature.dense() if isinstance(self.curvature, Arrow) else self.curvature
-
-
 @compiled
 def _outputs(problem: Problem, y: Array, moved: Array) -> Float[Array, "r k c"]:
     """Whitened errors at `y`, the initial states of all runs moved by the same `moved` (in their spreads)."""
     vehicle, start = problem.split(y)
     return errors(vehicle, problem.runs, start + problem.start_std * moved) / problem.sigma
-
-
-@compiled
-def _split(problem: Problem, y: Array) -> tuple[AbstractVehicle, Array, Float[Array, " q"]]:
-    """Vehicle and initial states at `y`; and the errors' columns by it, in those of the outputs by physical values."""
-    p = len(problem.prior_mean)
-    _, slope = jax.jvp(problem.transform.to_physical, (y[:p],), (jnp.ones(p, y.dtype),))
-    scale = jnp.concatenate([-jnp.where(problem.moving, slope, 0.0), -jnp.ones_like(problem.start_std), jnp.ones(1)])
-    return *problem.split(y), scale
-
-
-def _prior(problem: Problem, y: Array) -> Float[Array, " d"]:
-    p = len(problem.prior_mean)
-    theta = problem.transform.to_physical(y[:p])
-    return jnp.concatenate([(theta - problem.prior_mean) / problem.prior_std, y[p:]])

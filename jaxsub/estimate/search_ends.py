@@ -8,8 +8,8 @@ from jaxtyping import Array, Float
 from ..programs import compiled
 from ..results import RESULTS
 from .damped import room_downhill
-from .fitting import inverse_information, judged, standard_errors_away
 from .method import Found, in_shares, lanes_for, problems
+from .optimum import inertia, inverse_information, judged, standard_errors_away
 from .problem import Problem
 
 
@@ -58,4 +58,4 @@ def _evaluated(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array
 def _judged(problem: Problem, theta: Float[Array, "n p"], away: Float[Array, " n"], result: RESULTS) -> RESULTS:
     names = [row.name for row in problem.vehicle.layout.free]
     vehicle = lambda theta: problem.vehicle.with_values(dict(zip(names, theta, strict=True)))
-    return jax.vmap(lambda theta, away, result: judged(vehicle(theta), away, result))(theta, away, result)
+    return jax.vmap(lambda theta, away, result: judged(inertia(vehicle(theta)), away, result))(theta, away, result)

@@ -20,14 +20,14 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from ..arrays import quietly
-from ..estimate import Problem, Solution
+from ..estimate import Coordinates, Solution
 from ..likelihood import Disturbance, Linearised, System, share_of
 from ..likelihood.blocks import Watch, nobody
 from ..likelihood.disturbance import Adjoint, carried_back, carried_to_start
 from ..likelihood.run_shares import Progress
 from ..programs import compiled, on_cores
 from ..recording.runs import Runs
-from .residual_disturbance import Directions, residual_disturbance, whitened_columns
+from .residual_disturbance import Directions, Noise, residual_disturbance, whitened_columns
 
 
 class Coloured(eqx.Module):
@@ -57,7 +57,8 @@ def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, w
     `watch` is called with the share of both passes over the samples that is done.
     """
     problem, model = fit.problem, fit.model
-    reduced = _reduced(problem, model.products, np.asarray(fit.pressed) != 0.0)
+    held, noise = np.asarray(fit.pressed) != 0.0, Noise.of(problem)
+    reduced = _reduced(problem.without_vehicle, problem.values, model.products, held)
     if disturbance is None:
         disturbance = residual_disturbance(problem, model, reduced.directions, lambda share: watch(0.5 * share))
     done = Progress(model.shares, lambda share: watch(0.5 + 0.5 * share))
@@ -68,7 +69,7 @@ def coloured_covariance(fit: Solution, disturbance: Disturbance | None = None, w
         adjoint = Adjoint.at_end(size, len(problem.start_std), len(disturbance.force), len(fit.names))
         for index in reversed(range(model.blocks)):
             block = model.block(number, index)
-            adjoint = _back(problem, *block, reduced._replace(gain=gain), disturbance, adjoint)
+            adjoint = _back(noise, *block, reduced._replace(gain=gain), disturbance, adjoint)
             done.of(some)(1.0 - index / model.blocks)
         return np.asarray(_to_start(disturbance, adjoint))
 
@@ -90,11 +91,13 @@ class _Reduced(NamedTuple):
 
 
 @compiled
-def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array, " p"]) -> _Reduced:
+def _reduced(
+    space: Coordinates, at: Float[Array, " p"], products: Float[Array, "r q q"], held: Bool[Array, " p"]
+) -> _Reduced:
     p = len(held)
     theta = jnp.where(held[:, None] | held, 0.0, products[:, :p, :p])
     mixed = jnp.where(held, 0.0, products[:, p:-1, :p])
-    precision = jnp.where(held, 1.0, problem.prior_std**-2.0)
+    precision = jnp.where(held, 1.0, space.prior_std**-2.0)
     own = products[:, p:-1, p:-1]
     gain = jnp.linalg.solve(own + jnp.eye(own.shape[-1]), mixed)
     # what is left of the columns once the initial states have followed, and what their priors then say
@@ -103,9 +106,7 @@ def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array
     left = theta - across - jnp.swapaxes(across, 1, 2) + turned @ own @ gain
     pinned = jnp.sum(turned @ gain, axis=0) + jnp.diag(precision)
     basis, unidentifiable = _directions(jnp.sum(left, axis=0) + pinned)
-    values = problem.vehicle.values()
-    at = [values[row.name] for row in problem.vehicle.layout.free]
-    away = jnp.where(held, 0.0, problem.prior_mean - jnp.stack(at)) if at else jnp.zeros(0)
+    away = jnp.where(held, 0.0, space.prior_mean - at)
     pulled = jnp.column_stack([away, basis])
     prior = pulled.T @ (precision[:, None] * pulled)
     # an unidentifiable direction has an empty column, and must not make the matrix of the others singular
@@ -116,7 +117,7 @@ def _reduced(problem: Problem, products: Float[Array, "r q q"], held: Bool[Array
 
 @compiled
 def _back(
-    problem: Problem,
+    noise: Noise,
     runs: Runs,
     model: Linearised,
     reduced: _Reduced,
@@ -124,8 +125,8 @@ def _back(
     after: Adjoint,
 ) -> Adjoint:
     """The adjoint recursion of the scores' covariance through one block."""
-    theta, start, _ = whitened_columns(problem, runs, model)
-    system = System.of(model, runs, problem.sigma, problem.start_std)
+    theta, start, _ = whitened_columns(noise, runs, model)
+    system = System.of(model, runs, noise.sigma, noise.start_std)
     left = jnp.where(reduced.directions.held, 0.0, theta) - start @ reduced.gain[:, None]
     return carried_back(disturbance, system, left, after)
 

@@ -18,7 +18,7 @@ from ..likelihood import BlockLinearised, Linearised
 from ..likelihood.blocks import Watch, nobody
 from ..programs import compiled
 from ..recording.runs import Runs
-from .residual_disturbance import whitened_columns
+from .residual_disturbance import Noise, whitened_columns
 
 # standard error over a coefficient's size up to which it is identified
 FRACTION = 0.5
@@ -150,11 +150,11 @@ def _triangle(problem: Problem, model: BlockLinearised, watch: Watch) -> Float[n
     states is another block.
     """
     p, s = len(problem.prior_mean), len(problem.start_std)
-    left, size = [], model.shares[0].stop
+    noise, left, size = Noise.of(problem), [], model.shares[0].stop
     for number in range(len(model.shares)):
         own = np.broadcast_to(np.eye(s, s + p), (size, s, s + p))
         for index in range(model.blocks):
-            own = _upper(np.concatenate([own, _block_triangle(problem, *model.block(number, index))], axis=1))
+            own = _upper(np.concatenate([own, _block_triangle(noise, *model.block(number, index))], axis=1))
             watch((number + (index + 1) / model.blocks) / len(model.shares))
         left.append(own[:, s:, s:].reshape(-1, p))
     return _upper(np.concatenate([*left, np.diag(1.0 / np.asarray(problem.prior_std))]))
@@ -166,8 +166,8 @@ def _upper(matrix: Float[np.ndarray, "*r n q"]) -> Float[np.ndarray, "*r m q"]:
 
 
 @compiled
-def _block_triangle(problem: Problem, runs: Runs, model: Linearised) -> Float[Array, "r q q"]:
+def _block_triangle(noise: Noise, runs: Runs, model: Linearised) -> Float[Array, "r q q"]:
     """R of each run's whitened columns in one block: by its initial state, then by the coefficients."""
-    theta, start, _ = whitened_columns(problem, runs, model)
+    theta, start, _ = whitened_columns(noise, runs, model)
     columns = jnp.concatenate([start, theta], axis=-1)
     return jnp.linalg.qr(columns.reshape(len(columns), -1, columns.shape[-1]), mode="r")

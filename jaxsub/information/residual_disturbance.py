@@ -8,6 +8,7 @@ the whole run: for white residuals of 24 000 samples it made standard errors up 
 import dataclasses
 import itertools
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -38,6 +39,18 @@ from ..recording.runs import Runs
 _WINDOWS, _LENGTH, _CARRIED = 8, 2500, 3_000_000
 
 
+class Noise(NamedTuple):
+    """Standard deviations (c,) of the channels' noise and (s,) of the initial states before the data, SI."""
+
+    sigma: Float[Array, " c"]
+    start_std: Float[Array, " s"]
+
+    @classmethod
+    def of(cls, problem: Problem) -> "Noise":
+        """Of a problem; whatever its vehicle is, programs that take these serve it."""
+        return cls(problem.sigma, problem.start_std)
+
+
 class Directions(eqx.Module):
     """Which combinations of coefficients are fitted to residuals.
 
@@ -56,15 +69,13 @@ def residual_disturbance(problem: Problem, model: BlockLinearised, directions: D
     """The disturbance of the residuals of `model`. `watch` is called with the share that is done."""
     runs, linearised = _windows(model)
     whole = runs.times.shape[1] == model.runs.times.shape[1]
-    averages = () if whole else (_averages(problem, model, directions, watch),)
-    return _estimated(problem, runs, linearised, directions, *averages)
+    averages = () if whole else (_averages(Noise.of(problem), model, directions, watch),)
+    return _estimated(Noise.of(problem), runs, linearised, directions, *averages)
 
 
 @compiled
-def _estimated(
-    problem: Problem, runs: Runs, model: Linearised, directions: Directions, *averages: Averages
-) -> Disturbance:
-    system, shown = _residual_and_columns(problem, runs, model, directions)
+def _estimated(noise: Noise, runs: Runs, model: Linearised, directions: Directions, *averages: Averages) -> Disturbance:
+    system, shown = _residual_and_columns(noise, runs, model, directions)
     guess = lambda system, shown: first_guess([response(system, jnp.asarray(shown)[..., 0])], system.C.shape[2])
     start = guess(system, shown)
     for part in averages:
@@ -103,7 +114,7 @@ def _beside(parts: Sequence[Runs]) -> Runs:
     )
 
 
-def _averages(problem: Problem, model: BlockLinearised, directions: Directions, watch: Watch) -> Averages:
+def _averages(noise: Noise, model: BlockLinearised, directions: Directions, watch: Watch) -> Averages:
     """Means over groups of samples, about as many as a window has samples, at least one in a block."""
     chosen = _spread(len(model.runs.times), max(1, _LENGTH // model.blocks))
     groups = max(1, _LENGTH // (model.blocks * len(chosen)))
@@ -114,7 +125,7 @@ def _averages(problem: Problem, model: BlockLinearised, directions: Directions, 
             runs, linearised = model.block(number, index)
             for run in inside:
                 own = jax.tree.map(lambda leaf, run=run: np.asarray(leaf)[run : run + 1], linearised)
-                means[index].append(jax.device_get(_means(problem, runs.take([run], 1), own, directions, groups)))
+                means[index].append(jax.device_get(_means(noise, runs.take([run], 1), own, directions, groups)))
             watch((number + (index + 1) / model.blocks) / len(model.shares))
     beside = lambda *arrays: np.concatenate(arrays) if np.ndim(arrays[0]) > 1 else arrays[0]
     joined = [jax.tree.map(beside, *own) for own in means]
@@ -123,18 +134,18 @@ def _averages(problem: Problem, model: BlockLinearised, directions: Directions, 
 
 @compiled
 def _means(
-    problem: Problem, runs: Runs, model: Linearised, directions: Directions, groups: int
+    noise: Noise, runs: Runs, model: Linearised, directions: Directions, groups: int
 ) -> tuple[System, Float[Array, "r j1 c q"]]:
-    return group_means(*_residual_and_columns(problem, runs, model, directions), groups)
+    return group_means(*_residual_and_columns(noise, runs, model, directions), groups)
 
 
 def _residual_and_columns(
-    problem: Problem, runs: Runs, model: Linearised, directions: Directions
+    noise: Noise, runs: Runs, model: Linearised, directions: Directions
 ) -> tuple[System, Float[Array, "r k c q"]]:
     """The linearised system, and the residual beside the columns along the `basis`."""
-    theta, _, residual = whitened_columns(problem, runs, model)
+    theta, _, residual = whitened_columns(noise, runs, model)
     theta = jnp.where(directions.held, 0.0, theta) @ directions.basis
-    system = System.of(model, runs, problem.sigma, problem.start_std)
+    system = System.of(model, runs, noise.sigma, noise.start_std)
     return system, jnp.concatenate([residual[..., None], theta], axis=-1)
 
 
@@ -143,8 +154,8 @@ def _spread(count: int, most: int) -> Int[np.ndarray, " m"]:
     return np.linspace(0, count - 1, min(count, most)).round().astype(int)
 
 
-def whitened_columns(problem: Problem, runs: Runs, model: Linearised) -> tuple[Array, Array, Array]:
+def whitened_columns(noise: Noise, runs: Runs, model: Linearised) -> tuple[Array, Array, Array]:
     """Whitened sensitivities to the coefficients (physical) and to the initial states (in their spreads); residuals."""
-    weight = runs.mask / problem.sigma
+    weight = runs.mask / noise.sigma
     theta = model.theta * weight[..., None]
-    return theta, model.start * weight[..., None] * problem.start_std, model.error / problem.sigma
+    return theta, model.start * weight[..., None] * noise.start_std, model.error / noise.sigma

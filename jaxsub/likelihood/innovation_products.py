@@ -215,13 +215,13 @@ def products_adjoint(
             first, before = each
             at = jax.vmap(lambda k: _sample(run, k))(first + jnp.arange(length))
             passed = jax.lax.scan(_met, before, at)[1]
-            u, *solved = _solved(passed)
+            u, gain, inverse = _solved(passed)
             # of all samples at once: one large product
             pull = (u.reshape(-1, q) @ both).reshape(u.shape)
             return jax.lax.scan(
-                lambda carry, each: _back_step(carry, *each, log_determinant),
+                lambda carry, met: _back_step(carry, *met, log_determinant),
                 after,
-                (at, passed, u, *solved, pull),
+                (at, passed, u, gain, inverse, pull),
                 reverse=True,
             )
 

@@ -5,7 +5,7 @@ import jax
 import numpy as np
 from jaxtyping import Array
 
-from ..effects import Motion
+from ..effects import AbstractForce, AbstractMemory, Motion
 from ..programs import compiled
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
@@ -35,9 +35,17 @@ class Trajectory(eqx.Module):
     @classmethod
     def of(cls, vehicle: AbstractVehicle, runs: Runs, expected: Array, filtered: Array) -> "Trajectory":
         """The motion of `vehicle` over `runs` along states (R, K, s) `expected` and `filtered`, SI."""
-        found = _trajectory(vehicle, runs, expected, filtered)
+        found = _trajectory(_without_forces(vehicle), runs, expected, filtered)
         steps = np.where(runs.live, np.asarray(runs.steps)[np.asarray(runs.step_of)], 0.0)
         return cls(*(jax.tree.map(np.asarray, part) for part in (*found, runs.times, steps)))
+
+
+def _without_forces(vehicle: AbstractVehicle) -> AbstractVehicle:
+    """A vehicle that moves alike along given states: what forces its effects add makes no other program."""
+    for effect in vehicle.effects:
+        if isinstance(effect, AbstractForce) and not isinstance(effect, AbstractMemory):
+            vehicle = vehicle.without_effect(effect.label)
+    return vehicle
 
 
 @compiled
