@@ -46,6 +46,11 @@ class Examination:
     memory: Memory
 
     @property
+    def numbers(self) -> list[int]:
+        """Of the selected effects."""
+        return [one.number for one in self.naming.named]
+
+    @property
     def unexplained(self) -> bool:
         """Whether the selected effects leave correlated innovations or a significant nonparametric force."""
         return self.memory.correlated or self.nonparametric is not None
@@ -302,15 +307,14 @@ def proposed_effects(found: Examination, judged: Judged) -> list[int]:
     That one is sought among those chosen, else among all significant candidates. It is not proposed where a
     nonparametric force leaves far less of the simulation error, or any less if it was not chosen.
     """
-    numbers = [one.number for one in found.naming.named]
     if judged.named:
-        return numbers
+        return found.numbers
     selector = found.selector
     share = selector.majority_shares()
     if not np.any(share):
         return []
     nonparametric = 1.0 - most_explained(found.view, selector.simulation.disturbance)
-    for among, less in ((numbers, settings.LARGE_ERROR**2), (range(len(share)), 1.0)):
+    for among, less in ((found.numbers, settings.LARGE_ERROR**2), (range(len(share)), 1.0)):
         best = max(among, key=lambda i: share[i], default=None)
         if best is not None and share[best] > 0.0 and 1.0 - share[best] <= less * nonparametric:
             selector.by_simulation.add(best)

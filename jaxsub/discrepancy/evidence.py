@@ -32,6 +32,8 @@ from .innovation_search import root_or_one
 from .products import Products, conditional
 from .view import View
 
+# of the estimated disturbance: so small that it absorbs nothing of a simulation's error, and not singular
+_STILL = 1e-6
 # bytes that columns may take which are kept from one pass to the next
 _MEMORY = 2**30
 
@@ -108,6 +110,11 @@ class Evidence:
         cut = np.concatenate(by_run)[: len(system.measured)] / unit
         samples = int(np.sum(np.asarray(system.measured)))
         return Products(disturbance, gram, sum(log_determinants), samples, len(prior), cut, cut[:, :, at])
+
+    def simulated(self) -> Products:
+        """The products under a disturbance that absorbs nothing: those of a simulation's error."""
+        own = self.view.disturbance
+        return self.under(Disturbance(_STILL * own.force, own.time, np.ones_like(own.noise)))
 
     def predicted(self, chosen: Sequence[int], products: Products) -> Float[np.ndarray, " m"]:
         """Log probability of each part of the recordings by the others, which leave every number some room.

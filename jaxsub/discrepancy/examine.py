@@ -14,7 +14,7 @@ from .progress import Progress
 from .selector import Selector
 from .tuned import tuned
 from .view import View, facts
-from .whiteness import RANDOM, Memory, memory
+from .whiteness import Memory, memory
 
 
 def examine(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, progress: Progress) -> Examination:
@@ -40,8 +40,6 @@ def listed(view: View, vocabulary: tuple[type[AbstractEffect], ...] | None, *, p
 def weighed(view: View, selector: Selector, progress: Progress) -> Examination:
     """The examination by the usable candidates of a selector."""
     naming, evidence = name(selector, progress), selector.evidence
-    if naming.again:
-        return Examination(view, selector, naming, None, RANDOM)
     progress("looking for nonparametric forces")
     bare = evidence.best([])[1]
     under = [naming.products] if naming.products is bare else [bare, naming.products]

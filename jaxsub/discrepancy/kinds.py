@@ -46,13 +46,12 @@ def missing(named: Sequence[Named]) -> dict[str, float]:
 def leading(found: Examination) -> dict[str, float]:
     """Posterior probability of each kind that it holds the largest mismatch, by the first examination."""
     selector, scan = found.selector, found.naming.first
-    values, nothing = selector.evidence_in_simulation() if found.naming.again else (scan.value, selector.value([]))
     of_name: dict[tuple[str, str], list[float]] = {}
-    for effect, value in zip(selector.candidates, np.where(np.isfinite(scan.value), values, -np.inf), strict=True):
+    for effect, value in zip(selector.candidates, scan.value, strict=True):
         of_name.setdefault((kind(effect), effect.name), []).append(float(value))
     if found.pattern is not None:
         of_name[_STRUCTURE, found.pattern.force.name] = [found.pattern.alone]
-    of_kind = {_DISTURBANCE: [nothing]}
+    of_kind = {_DISTURBANCE: [selector.value([])]}
     for (own, _), forms in of_name.items():
         of_kind.setdefault(own, []).append(float(np.logaddexp.reduce(forms)))
     mean = [np.logaddexp.reduce(names) - np.log(len(names)) for names in of_kind.values()]

@@ -47,7 +47,6 @@ class Naming:
 
     - `named`: with posterior probabilities, in the order of selection.
     - `products`: under the disturbance that is left. `columns`: of the selected effects. `value`: their log evidence.
-    - `again`: whether the last was selected by simulation, so that all is to be examined again with it in the model.
     - `first`: the scan before any selection; `candidates`: its lines for the report.
     - `first_p`: family-wise p-value of the largest score before any selection.
     """
@@ -56,7 +55,6 @@ class Naming:
     products: Products
     columns: list[int]
     value: float
-    again: bool
     first: Scan
     candidates: list[Candidate]
     first_p: float
@@ -66,8 +64,7 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
     """The selected candidates, the scans before each selection and at the end, and the p-value of each best.
 
     A candidate that does not improve the prediction of parts of the recordings by the others is passed over: a flexible
-    effect fits any misfit, but not the same in every part. One that was selected by simulation ends the selection: with
-    so large a simulation error, scores of smaller effects are not to be trusted.
+    effect fits any misfit, but not the same in every part.
     """
     chosen: list[int] = []
     scans, p_values = [], []
@@ -77,7 +74,7 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
         progress(f"weighing the vocabulary ({len(chosen)} effects so far)")
         scan = _settled(selector, chosen)
         scans.append(scan)
-        best = selector.next_candidate(chosen, scan)
+        best = int(np.argmax(scan.value))
         gain = scan.value[best] - selector.value(chosen)
         p_values.append(selector.p_value(best, scan) if np.isfinite(gain) else 1.0)
         if not gain > 0.0 or p_values[-1] >= settings.SIGNIFICANCE or len(chosen) == settings.MOST_EFFECTS:
@@ -87,8 +84,6 @@ def select(selector: Selector, progress: Progress) -> tuple[list[int], list[Scan
             scans.pop()
             p_values.pop()
             continue
-        if best in selector.by_simulation:
-            return [*chosen, best], scans, p_values
         chosen = _without_idle(selector, [*chosen, best])
 
 
@@ -137,9 +132,8 @@ def name(selector: Selector, progress: Progress) -> Naming:
     value, products = selector.evidence.best(selector.columns(chosen))
     named = with_probabilities(selector, chosen)
     lines = table(selector, scans[0])
-    again = any(i in selector.by_simulation for i in chosen)
     first_p = selector.smallest_p_value(scans[0])
-    return Naming(named, products, selector.columns(chosen), value, again, scans[0], lines, first_p)
+    return Naming(named, products, selector.columns(chosen), value, scans[0], lines, first_p)
 
 
 def with_probabilities(selector: Selector, chosen: Sequence[int], refused: Collection[int] = ()) -> list[Named]:

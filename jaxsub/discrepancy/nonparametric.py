@@ -238,9 +238,5 @@ def most_explained(view: View, disturbance: Disturbance) -> float:
         return 0.0
     drawn = columns_of(view, (column for force in forces for column in basis_forces(view, force, KNOTS)))
     products = Evidence.of(view, drawn, [disturbance]).products[0]
-    return float(np.max(products.explained([], _owners(forces, 0, KNOTS))))
-
-
-def _owners(forces: Sequence[SmoothForce], first: int, knots: int) -> list[list[int]]:
-    """The columns of each force's hat functions, which begin after the `first`."""
-    return [list(range(first + knots * i, first + knots * (i + 1))) for i in range(len(forces))]
+    owners = [list(range(KNOTS * i, KNOTS * (i + 1))) for i in range(len(forces))]
+    return float(np.max(products.explained([], owners)))

@@ -1,4 +1,4 @@
-"""The gain of every candidate on top of those already selected, and which of them to select next."""
+"""The gain of every candidate on top of those already selected."""
 
 import collections
 import copy
@@ -9,16 +9,12 @@ import numpy as np
 from scipy import special
 
 from ..effects import AbstractEffect, RunVariation, admissible, admitted, amplitudes, numbers, with_numbers
-from ..likelihood import Disturbance
 from . import settings
 from .columns import plausible
 from .evidence import Evidence, most_columns
 from .multiplicity import family_wise, independent_tests
 from .products import Products
 from .view import View
-
-# of the estimated disturbance: so small that it absorbs nothing of a simulation's error, and not singular
-_STILL = 1e-6
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,11 +81,6 @@ class Selector:
         looked_at: Mapping[str, int],
     ):
         self.evidence, self.candidates, self.owners = evidence, list(candidates), [list(own) for own in owners]
-        own = evidence.view.disturbance
-        # a simulation has no disturbance that could absorb its error
-        still = Disturbance(_STILL * own.force, own.time, np.ones_like(own.noise))
-        self.simulation = evidence.under(still)
-        self.ignores_simulation = False
         forms = collections.Counter(effect.name for effect in self.candidates)
         # every name is as probable as any other before the data, and within a name every form
         self.prior = -np.log([looked_at.get(effect.name, forms[effect.name]) for effect in self.candidates])
@@ -108,6 +99,7 @@ class Selector:
         """Nothing is estimated; what the coefficients absorb or the vehicle has is no candidate."""
         self.estimated: set[tuple[int, ...]] = set()
         self.by_simulation: set[int] = set()
+        self._simulation: Products | None = None
         self.kept = self.evidence.products[0].kept(self.owners)
         present = {effect.label for effect in self.evidence.view.vehicle.all_effects}
         absent = np.array([effect.label not in present for effect in self.candidates], bool)
@@ -121,7 +113,7 @@ class Selector:
     def seen_from(self, view: View, keep: np.ndarray) -> "Selector":
         """The same candidates for a view that `Evidence.seen_from` takes."""
         other = copy.copy(self)
-        other.evidence, other.simulation = self.evidence.seen_from(view, keep), self.simulation.seen_from(keep)
+        other.evidence = self.evidence.seen_from(view, keep)
         other._begin()
         return other
 
@@ -172,46 +164,15 @@ class Selector:
         leaders = {int(np.argmax(scan.value)): float(np.max(scan.value)) for scan in scans}
         return [index for index, value in leaders.items() if np.isfinite(value)]
 
+    @property
+    def simulation(self) -> Products:
+        """The products of a simulation's error, made when they are first asked for."""
+        self._simulation = self._simulation or self.evidence.simulated()
+        return self._simulation
+
     def simulation_shares(self, chosen: Sequence[int]) -> np.ndarray:
         """(m,) the share of the simulation error left by `chosen` that each candidate explains."""
         return self.simulation.explained(self.columns(chosen), self.owners)
-
-    def evidence_in_simulation(self) -> tuple[np.ndarray, float]:
-        """(m,) log evidence of the simulation error with each candidate alone, as `value`, and with none."""
-        without = self.simulation.log_evidence([])
-        return without + self.simulation.gains([], self.owners).evidence + self.prior, without
-
-    def predicted(self, chosen: Sequence[int], index: int, under: Products) -> tuple[AbstractEffect, bool]:
-        """A candidate with the parameters predicted beside `chosen`, and whether physics admits them."""
-        own = self.owners[index]
-        size = under.gains(self.columns(chosen), [own]).amplitudes[0]
-        return predict(self.candidates[index], size / self.evidence.lengths[own])
-
-    def ignore_simulation(self) -> None:
-        """Select by simulation no more: its selection was rejected, and accumulated errors have other causes."""
-        self.ignores_simulation = True
-        self.by_simulation.clear()
-
-    def next_candidate(self, chosen: Sequence[int], scan: Scan) -> int:
-        """Which candidate to select next: the most probable, unless it explains little of the simulation error.
-
-        Then the one that explains most of it: fast dynamics show in very many samples, and may not matter for long.
-        """
-        best = int(np.argmax(scan.value))
-        share = self.simulation_shares(chosen)
-        if self.ignores_simulation or share[best] > settings.MINOR_SHARE:
-            return best
-        major = self._significant(chosen, scan) & (share > settings.MAJOR_SHARE)
-        if not np.any(major):
-            return best
-        best = int(np.argmax(np.where(major, share, -np.inf)))
-        self.by_simulation.add(best)
-        return best
-
-    def _significant(self, chosen: Sequence[int], scan: Scan) -> np.ndarray:
-        """(m,) whether each candidate on top of `chosen` is significant and gains evidence."""
-        p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
-        return (scan.value > self.value(chosen)) & (p_values < settings.SIGNIFICANCE)
 
     def majority_shares(self) -> np.ndarray:
         """(m,) the share of a simulation error far above the noise that each candidate alone explains.
@@ -219,13 +180,12 @@ class Selector:
         0 where it is not most of them, or where the candidate is not significant.
         """
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
-        share = self.simulation_shares([])
-        if (
-            self.ignores_simulation
-            or not self.simulation.gram[0, 0] > settings.LARGE_ERROR**2 * noise * self.simulation.samples
-        ):
+        share, scan = self.simulation_shares([]), self.scan([])
+        if not self.simulation.gram[0, 0] > settings.LARGE_ERROR**2 * noise * self.simulation.samples:
             return np.zeros_like(share)
-        return np.where((share > settings.MAJORITY) & self._significant([], self.scan([])), share, 0.0)
+        p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
+        significant = (scan.value > self.value([])) & (p_values < settings.SIGNIFICANCE)
+        return np.where((share > settings.MAJORITY) & significant, share, 0.0)
 
     def alternatives_to(self, chosen: Sequence[int], index: int) -> np.ndarray:
         """(m,) whether each candidate is an alternative to `index` on top of `chosen`.
@@ -238,13 +198,17 @@ class Selector:
         most = settings.MAJORITY
         return (most * (1.0 - share) <= 1.0 - share[index]) & (share >= most * share[index])
 
+    def predicted(self, chosen: Sequence[int], index: int, under: Products) -> tuple[AbstractEffect, bool]:
+        """A candidate with the parameters predicted beside `chosen`, and whether physics admits them."""
+        own = self.owners[index]
+        size = under.gains(self.columns(chosen), [own]).amplitudes[0]
+        return predict(self.candidates[index], size / self.evidence.lengths[own])
+
     def predicts(self, chosen: Sequence[int], more: int) -> bool:
-        """Whether `more` improves the prediction of parts of the recordings by the others, or of a simulation."""
+        """Whether `more` improves the prediction of parts of the recordings by the others."""
         before, after = self.columns(chosen), self.columns([*chosen, more])
-        free = more in self.by_simulation
-        without, with_it = (self.simulation if free else self.evidence.best(columns)[1] for columns in (before, after))
-        predicted = lambda columns, products: float(np.sum(self.evidence.predicted(columns, products)))
-        return predicted(after, with_it) > predicted(before, without)
+        predicted = lambda columns: float(np.sum(self.evidence.predicted(columns, self.evidence.best(columns)[1])))
+        return predicted(after) > predicted(before)
 
     def p_value(self, index: int, scan: Scan) -> float:
         """Of a candidate's χ², family-wise: the probability of so small a smallest p-value of all under the null."""

@@ -50,11 +50,8 @@ MOST_EFFECTS: Final[int] = 4
 ALTERNATIVES: Final[int] = 2
 # relative error of a score by linearisation, over the root of the share that the free parameters leave
 SCORE_ERROR: Final[float] = 0.03
-# share of the squared simulation error that is hardly any: at or below it the most probable candidate gives way to one
-# of a major share, and surrogate terms are not worth a fit
+# share of the squared simulation error that is hardly any: surrogate terms that remove no more are not accepted
 MINOR_SHARE: Final[float] = 0.02
-# share of the squared simulation error above which a candidate is preferred to one of a minor share
-MAJOR_SHARE: Final[float] = 0.2
 
 # Acceptance
 

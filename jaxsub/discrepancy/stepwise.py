@@ -11,7 +11,7 @@ import numpy as np
 
 from ..effects import AbstractEffect, RunVariation
 from . import settings
-from .acceptance import CandidateModels, Model, ModelFitter, proposed_effects, without_insignificant
+from .acceptance import CandidateModels, Model, ModelFitter, without_insignificant
 from .cross_validation import Comparison, compare
 from .examine import listed, weighed
 from .innovation_models import InnovationModels, selector_without, validated_in_simulation
@@ -35,7 +35,7 @@ def stepwise_by_innovations(
         selector.usable[[effect.label in fallen for effect in selector.candidates]] = False
         found = weighed(best.view, selector, fitter.progress)
         linearised = judge(found.naming, found.pattern, found.memory)
-        chosen = proposed_effects(found, linearised)
+        chosen = found.numbers if linearised.named else []
         if not chosen:
             break
         grown = search.extended(CandidateModels(by_innovations.with_effects, best, found), chosen, named)
@@ -67,9 +67,7 @@ class _Search:
 
     def listed(self, model: Model, *, present: bool = False) -> Selector:
         """The candidates on top of a model; with `present` also the effects that it has."""
-        selector = listed(model.view, self.vocabulary, present=present)
-        selector.ignore_simulation()
-        return selector
+        return listed(model.view, self.vocabulary, present=present)
 
     def extended(
         self, models: CandidateModels, chosen: Sequence[int], named: Sequence[Named]

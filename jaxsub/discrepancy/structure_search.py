@@ -99,7 +99,7 @@ def answers(
                 refusals, after = refusals + 1, weighed(found.view, found.selector, fitter.progress)
         if after is None and not current.named:
             return best, judged, found
-        whole = len(current.named) == len(found.naming.named) and not (found.naming.again or found.unexplained)
+        whole = len(current.named) == len(found.naming.named) and not found.unexplained
         if (after is None and whole) or len(best.added) >= settings.MOST_EFFECTS:
             return best, judged, None
         if current.named:

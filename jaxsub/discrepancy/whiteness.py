@@ -29,9 +29,6 @@ class Memory(NamedTuple):
         return self.p_value < settings.RESIDUAL_LEVEL
 
 
-RANDOM = Memory(1.0, 1.0)
-
-
 def memory(white: Float[np.ndarray, "r k c"], measured: Bool[np.ndarray, "r k c"], gain: float) -> Memory:
     """Of innovations that are left beside effects which `gain` so much χ²."""
     past = remembered(white, measured)

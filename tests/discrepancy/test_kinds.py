@@ -1,13 +1,10 @@
 """The kind of mismatch is told, also before its name; and whether the numbers of the file are right beside it."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from diagnosis_cases import disturbed, recorded, wrong
 
-from jaxsub.discrepancy.acceptance import Examination
-from jaxsub.discrepancy.examine import examine, listed
+from jaxsub.discrepancy.examine import examine
 from jaxsub.discrepancy.kinds import leading, missing, right
 from jaxsub.discrepancy.model import fit_with
 from jaxsub.discrepancy.name import Named
@@ -53,32 +50,6 @@ def test_several_accepted_effects_are_each_of_a_kind():
         ("structure", 0.9),
         ("actuator", pytest.approx(0.1)),
     ]
-
-
-def test_where_a_free_run_asked_the_kind_is_what_it_asked_for():
-    """Claim: a lag that says more of the next sample gives way to the drag that a free run asks for, and only then."""
-    lag, drag = CONCEALED["actuator"], CONCEALED["structure"]
-    scan = SimpleNamespace(value=np.array([900.0, 100.0]))
-    selector = SimpleNamespace(
-        candidates=[lag, drag], value=lambda chosen: 0.0, evidence_in_simulation=lambda: (np.array([20.0, 800.0]), 10.0)
-    )
-
-    def first(again):
-        found = object.__new__(Examination)
-        found.__dict__.update(selector=selector, pattern=None, naming=SimpleNamespace(first=scan, again=again))
-        return next(iter(leading(found)))
-
-    assert (first(False), first(True)) == ("actuator", "structure")
-
-
-def test_evidence_of_a_free_run_with_one_candidate_is_that_of_its_block():
-    """Claim: for all candidates at once it is what the block of each says by itself."""
-    view = look(baseline(recorded(CONCEALED["sensor"], 5)[:2]))
-    selector = listed(view, KINDS)
-    values, nothing = selector.evidence_in_simulation()
-    alone = [selector.simulation.log_evidence(selector.columns([i])) for i in range(len(selector.candidates))]
-    np.testing.assert_allclose(values, np.array(alone) + selector.prior, rtol=1e-8, atol=1e-6)
-    assert nothing == selector.simulation.log_evidence([])
 
 
 @pytest.mark.parametrize("disturbance", [None, (3.0, (0.5, 1.5), 3)], ids=["clean", "disturbed"])

@@ -13,7 +13,7 @@ from jaxsub.discrepancy.progress import OutOfTime
 from jaxsub.discrepancy.surrogate import most_explaining, with_surrogate
 from jaxsub.discrepancy.verdict import Judged
 from jaxsub.discrepancy.view import look
-from jaxsub.discrepancy.whiteness import RANDOM, Memory
+from jaxsub.discrepancy.whiteness import Memory
 from jaxsub.effects import CubicDamping, CubicStiffness, QuadraticDamping, SensorScale
 from jaxsub.estimate import batch, fit
 from jaxsub.simulation import synthetic
@@ -67,9 +67,10 @@ class Fitter(ModelFitter):
 
 def test_what_moves_the_rig_explains_its_simulation_error():
     """Claim: by share, both that it lacks and no twin beside them; a twin in place of one; a scale error never."""
-    labels = lambda found: [effect.label for effect in most_explaining(found.selector, found.selector.simulation)]
+    simulated = lambda found: found.selector.evidence.simulated()
+    labels = lambda found: [effect.label for effect in most_explaining(found.selector, simulated(found))]
     found = usable()
-    explained = found.selector.simulation.explained([], found.selector.owners)
+    explained = simulated(found).explained([], found.selector.owners)
     share = dict(zip([one.label for one in found.selector.candidates], explained, strict=True))
     assert sorted([DRAG, SPRING], key=lambda label: -share[label]) == labels(found)
     assert labels(usable(DRAG))[:1] == ["cubic-damping[x]"]
@@ -94,7 +95,7 @@ def test_what_has_no_name_joins_as_surrogate_terms_where_something_is_left():
     assert float(best.fit.cost) < 0.2 * float(named.fit.cost)
     assert (said.verdict, said.named) == ("unknown", [])
     assert DRAG in said.notes[0] and SPRING in said.notes[0]
-    nothing_left = dataclasses.replace(usable(), memory=RANDOM)
+    nothing_left = dataclasses.replace(usable(), memory=Memory(1.0, 1.0))
     assert with_surrogate(fitter, named, nothing_left, UNKNOWN, KINDS) == (named, UNKNOWN)
 
 
