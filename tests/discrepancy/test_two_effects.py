@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter, dominant, fitted_model
+from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter, dominant, fitted_model, proposed_effects
 from jaxsub.discrepancy.examine import listed, weighed
 from jaxsub.discrepancy.progress import OutOfTime
 from jaxsub.discrepancy.surrogate import most_explaining, with_surrogate
@@ -38,6 +38,7 @@ def lacking() -> tuple[Model, Examination]:
 def usable(*left_out: str) -> Examination:
     """The examination with all candidates but some."""
     _, found = lacking()
+    found.selector.by_simulation.clear()
     found.selector.usable[:] = [effect.label not in left_out for effect in found.selector.candidates]
     return found
 
@@ -67,7 +68,7 @@ class Fitter(ModelFitter):
 
 def test_what_moves_the_rig_explains_its_simulation_error():
     """Claim: by share, both that it lacks and no twin beside them; a twin in place of one; a scale error never."""
-    simulated = lambda found: found.selector.evidence.simulated()
+    simulated = lambda found: found.selector.simulation
     labels = lambda found: [effect.label for effect in most_explaining(found.selector, simulated(found))]
     found = usable()
     explained = simulated(found).explained([], found.selector.owners)
@@ -75,6 +76,16 @@ def test_what_moves_the_rig_explains_its_simulation_error():
     assert sorted([DRAG, SPRING], key=lambda label: -share[label]) == labels(found)
     assert labels(usable(DRAG))[:1] == ["cubic-damping[x]"]
     assert share["sensor-scale[x]"] > 0.05 and labels(usable(DRAG, SPRING, "cubic-damping[x]")) == []
+
+
+def test_what_explains_most_of_a_simulation_error_is_proposed_where_all_are_rejected():
+    """Claim: the drag is, and its twin may stand for it, a scale error not; without it its twin yields to any force."""
+    found = usable()
+    labels = [effect.label for effect in found.selector.candidates]
+    assert [labels[i] for i in proposed_effects(found, UNKNOWN)] == [DRAG]
+    may = dict(zip(labels, found.selector.alternatives_to([], labels.index(DRAG)), strict=True))
+    assert may["cubic-damping[x]"] and not may["sensor-scale[x]"]
+    assert proposed_effects(usable(DRAG), UNKNOWN) == []
 
 
 def test_an_effect_whose_evidence_is_nearly_that_of_all_is_fitted_first():
