@@ -38,17 +38,20 @@ class Sampled(eqx.Module):
         return cls(vehicle, inverse, table, runs.substeps)
 
     def rates(
-        self, state: Float[Array, " s"], signals: Float[Array, " m"], extra: Float[Array, " n"] | float = 0.0
-    ) -> Float[Array, " s"]:
-        """Rates of the `state` (s,) without the velocities' linear part, SI.
+        self,
+        velocity: Float[Array, " n"],
+        position: Float[Array, " m"],
+        signals: Float[Array, " u"],
+        extra: Float[Array, " n"] | float = 0.0,
+    ) -> tuple[Float[Array, " n"], Float[Array, " m"]]:
+        """Rates of the `velocity` (n,), without its linear part, and of the `position` (m,), SI.
 
-        `signals` (m,) are the inputs, SI, and `extra` (n,) a generalised force more, N or N m.
+        `signals` (u,) are the inputs, SI, and `extra` (n,) a generalised force more, N or N m.
         """
-        n = len(self.inverse)
-        motion = self.vehicle.motion(state, signals)
-        moved = stack(self.vehicle.position_rates(motion), self.vehicle.layout.positions, state[0])
+        motion = self.vehicle.motion(jnp.concatenate([velocity, position]), signals)
+        moved = stack(self.vehicle.position_rates(motion), self.vehicle.layout.positions, velocity[0])
         rate = self.inverse @ (self.vehicle.force(motion) + extra)
-        return jnp.concatenate([rate if self.rest is None else rate + self.rest @ state[:n], moved])
+        return rate if self.rest is None else rate + self.rest @ velocity, moved
 
     def step(
         self,
@@ -72,8 +75,7 @@ class Sampled(eqx.Module):
         @jax.jit
         def rates(velocity: Array, position: Array, node: Array) -> tuple[Array, Array]:
             signals, force = (node, 0.0) if extra is None else (node[:-n], node[-n:])
-            rate = self.rates(jnp.concatenate([velocity, position]), signals, force)
-            return rate[:n], rate[n:]
+            return self.rates(velocity, position, signals, force)
 
         def advance(carry: tuple[Array, Array], part: Array) -> tuple[tuple[Array, Array], None]:
             return exponential_step(rates, weights, *carry, part), None

@@ -96,7 +96,7 @@ def _step(
     # compiled apart so that the four stages are traced once
     @jax.jit
     def rates(numbers: Sampled, state: Array, node: Array, share: Array) -> Float[Array, " s"]:
-        return eqx.combine(numbers, others).rates(state, node, share @ push)
+        return jnp.concatenate(eqx.combine(numbers, others).rates(state[:n], state[n:], node, share @ push))
 
     def by_parameters(state: Array, node: Array, share: Array, by_node: Array) -> Float[Array, "s p"]:
         at_rest = lambda numbers, node: rates(numbers, state, node, share)
