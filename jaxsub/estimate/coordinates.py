@@ -48,9 +48,9 @@ class Coordinates(eqx.Module):
         p = len(self.prior_mean)
         _, slope = jax.jvp(self.transform.to_physical, (y[:p],), (jnp.ones(p, y.dtype),))
         scale = jnp.concatenate([-jnp.where(self.moving, slope, 0.0), -jnp.ones_like(self.start_std), jnp.ones(1)])
-        return self.theta(y), self.start(y), scale
+        return self.theta(y), self.initial_states(y), scale
 
-    def start(self, y: Float[Array, " d"]) -> Float[Array, "r s"]:
+    def initial_states(self, y: Float[Array, " d"]) -> Float[Array, "r s"]:
         """The initial states at `y`, SI."""
         return self.guess + self.start_std * self.moved(y)
 

@@ -58,8 +58,8 @@ class Problem(Coordinates):
         """The problem of fitting `vehicle` to `runs`.
 
         The search starts from the initial states `start` (R, s), SI, if given; `sigma` (c,) is the noise of the
-        channels, SI. `moving` says which parameters may move: false frees the initial states alone. It is data and not
-        structure, so one compiled search serves every choice. `known_start` takes `start` for the truth.
+        channels, SI. Parameters that are not moving stay: false frees the initial states alone. That is data and not
+        structure, so one compiled search serves every choice. With known_start, `start` is the truth.
         """
         rows = vehicle.layout.free
         values = vehicle.values()
@@ -145,7 +145,9 @@ class Problem(Coordinates):
         r"""$\tfrac12\sum$ residuals² at the coordinates `y` (d,): minus the log-likelihood, up to its constant."""
         if self.march is None:
             return 0.5 * jnp.sum(self.residuals(y) ** 2)
-        squares = self.march.squares(self.vehicle_at, y[: len(self.prior_mean)], self.start(y), self.runs, self.sigma)
+        squares = self.march.squares(
+            self.vehicle_at, y[: len(self.prior_mean)], self.initial_states(y), self.runs, self.sigma
+        )
         return 0.5 * (jnp.sum(squares) + jnp.sum(self.prior(y) ** 2))
 
     @compiled
@@ -162,7 +164,9 @@ class Problem(Coordinates):
         p, s = len(self.prior_mean), 0 if self.known_start else len(self.start_std)
         still = jnp.zeros(len(self.start_std))
         if self.march is not None:
-            return self.march.products(self.vehicle_at, y[:p], self.start(y), self.start_std, self.runs, self.sigma)
+            return self.march.products(
+                self.vehicle_at, y[:p], self.initial_states(y), self.start_std, self.runs, self.sigma
+            )
 
         def shown(change: Array) -> Array:
             return _outputs(self, y.at[:p].add(change[:p]), still.at[:s].add(change[p:]))
