@@ -22,7 +22,7 @@ from . import settings
 # dampings of a scoring step, of a column's squares, and shares of a change of the disturbance, tried in this order
 _DAMPINGS, _SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), (1.0, 0.5)
 # of what a search for the disturbance gained: to gain less is not worth a step before its columns change
-_SMALL = 0.1
+_SMALL = 0.01
 # alternations at most, and the change of the log likelihood below which they have converged
 _ALTERNATIONS, _CONVERGED = 8, 0.5
 # scoring steps at most under one disturbance, and the gain of the log likelihood below which they end
