@@ -180,9 +180,10 @@ class Selector:
         0 where it is not most of them, or where the candidate is not significant.
         """
         noise = float(np.mean(np.asarray(self.evidence.view.disturbance.noise) ** 2))
-        share, scan = self.simulation_shares([]), self.scan([])
+        share = self.simulation_shares([])
         if not self.simulation.gram[0, 0] > settings.LARGE_ERROR**2 * noise * self.simulation.samples:
             return np.zeros_like(share)
+        scan = self.scan([])
         p_values = np.array([self.p_value(i, scan) for i in range(len(self.candidates))])
         significant = (scan.value > self.value([])) & (p_values < settings.SIGNIFICANCE)
         return np.where((share > settings.MAJORITY) & significant, share, 0.0)

@@ -79,7 +79,7 @@ class Target(eqx.Module):
         y, sigma = self.split(at)
         p = len(self.problem.prior_mean)
         theta = self.problem.transform.to_physical(y[:p])
-        return theta, self.problem.guess + self.problem.start_std * self.problem.moved(y), sigma
+        return theta, self.problem.initial_states(y), sigma
 
     def _with(self, sigma: Array) -> Problem:
         return dataclasses.replace(self.problem, sigma=sigma)

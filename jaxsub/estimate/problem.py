@@ -116,13 +116,14 @@ class Problem(Coordinates):
     def split(self, y: Float[Array, " d"]) -> tuple[AbstractVehicle, Float[Array, "r s"]]:
         """The vehicle and the initial states that the coordinates `y` stand for."""
         theta, start, _ = self.without_vehicle.physical(y)
-        return self._vehicle_with(theta), start
+        return self.vehicle_with(theta), start
 
     def vehicle_at(self, y: Float[Array, " p"]) -> AbstractVehicle:
         """The vehicle that the coordinates `y` of the parameters stand for."""
-        return self._vehicle_with(self.theta(y))
+        return self.vehicle_with(self.theta(y))
 
-    def _vehicle_with(self, theta: Float[Array, " p"]) -> AbstractVehicle:
+    def vehicle_with(self, theta: Float[Array, " p"]) -> AbstractVehicle:
+        """The vehicle with the physical parameters `theta` (p,), SI."""
         # by NumPy: to cut an array of JAX would be a program for each place
         each = theta if isinstance(theta, Tracer) else jax.device_put([*np.asarray(theta)])
         names = [row.name for row in self.vehicle.layout.free]
@@ -184,7 +185,7 @@ class Problem(Coordinates):
         theta, start, scale = self.without_vehicle.physical(y)
         # by NumPy, for which no program has to be made
         scale = np.asarray(scale)
-        vehicle = self._vehicle_with(theta)
+        vehicle = self.vehicle_with(theta)
         gram = np.asarray(summed_products(vehicle, self.runs, start, self.sigma, self.start_std, watch))
         p, q = len(self.prior_mean), len(scale)
         kept = np.array([*range(p), q - 1]) if self.known_start else np.arange(q)

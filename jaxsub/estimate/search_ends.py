@@ -56,6 +56,5 @@ def _evaluated(_: None, problem: Problem, y: Float[Array, "n d"], outputs: Array
 
 @compiled
 def _judged(problem: Problem, theta: Float[Array, "n p"], away: Float[Array, " n"], result: RESULTS) -> RESULTS:
-    names = [row.name for row in problem.vehicle.layout.free]
-    vehicle = lambda theta: problem.vehicle.with_values(dict(zip(names, theta, strict=True)))
-    return jax.vmap(lambda theta, away, result: judged(inertia(vehicle(theta)), away, result))(theta, away, result)
+    one = lambda theta, away, result: judged(inertia(problem.vehicle_with(theta)), away, result)
+    return jax.vmap(one)(theta, away, result)

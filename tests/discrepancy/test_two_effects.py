@@ -68,10 +68,9 @@ class Fitter(ModelFitter):
 
 def test_what_moves_the_rig_explains_its_simulation_error():
     """Claim: by share, both that it lacks and no twin beside them; a twin in place of one; a scale error never."""
-    simulated = lambda found: found.selector.simulation
-    labels = lambda found: [effect.label for effect in most_explaining(found.selector, simulated(found))]
+    labels = lambda found: [effect.label for effect in most_explaining(found.selector, found.selector.simulation)]
     found = usable()
-    explained = simulated(found).explained([], found.selector.owners)
+    explained = found.selector.simulation.explained([], found.selector.owners)
     share = dict(zip([one.label for one in found.selector.candidates], explained, strict=True))
     assert sorted([DRAG, SPRING], key=lambda label: -share[label]) == labels(found)
     assert labels(usable(DRAG))[:1] == ["cubic-damping[x]"]
