@@ -123,7 +123,7 @@ class Problem(Coordinates):
         return self.vehicle_with(self.theta(y))
 
     def vehicle_with(self, theta: Float[Array, " p"]) -> AbstractVehicle:
-        """The vehicle with the physical parameters `theta` (p,), SI."""
+        """The vehicle of physical parameters (p,), SI."""
         # by NumPy: to cut an array of JAX would be a program for each place
         each = theta if isinstance(theta, Tracer) else jax.device_put([*np.asarray(theta)])
         names = [row.name for row in self.vehicle.layout.free]
