@@ -33,8 +33,8 @@ class Pattern:
 
     - `force`: with its predicted parameters; `heights`: (FINE,) of it, N or N m, at finer knots. `near`: the share of
       their squares, along the motion, that the force keeps.
-    - `p_value`: corrected for all forces screened; `predicts`: whether it improves the prediction of parts of the
-      recordings by the others.
+    - `p_value`: corrected for all forces screened; `significant`: whether that is small, and the force improves the
+      prediction of parts of the recordings by the others.
     - `alone`: log evidence with it and nothing else, its prior probability included.
     - `explained`: the share of what the selected effects and it explain together that the effects explain alone.
     """
@@ -43,14 +43,9 @@ class Pattern:
     heights: np.ndarray
     near: float
     p_value: float
-    predicts: bool
+    significant: bool
     alone: float
     explained: float
-
-    @property
-    def significant(self) -> bool:
-        """Whether it is significant and predicts."""
-        return self.predicts and self.p_value < settings.SIGNIFICANCE
 
     @property
     def joins(self) -> bool:
@@ -102,14 +97,15 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     varying = [c - len(chosen.columns) for c in columns if c >= len(chosen.columns)]
     beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))
 
-    def weighed(force: SmoothForce, among: Sequence[Products]) -> _Weighed:
-        disturbances = [one for products in among for one in with_smaller(products.disturbance)]
-        found = Evidence.of(view, beside(force), disturbances, chosen.varied)
-        return _Weighed(found.products, found.length, len(picked), varying)
+    disturbances = lambda products: with_smaller(products.disturbance)
+
+    def weighed(force: SmoothForce) -> _Weighed:
+        found = Evidence.of(view, beside(force), disturbances(under[-1]), chosen.varied)
+        return _Weighed(force, found, len(picked), varying)
 
     # one force after the other: products between forces are not needed
-    best = strongest(promising_forces(view, forces, np.asarray(mean)), lambda force: weighed(force, under[-1:]).value)
-    found = weighed(best, under)
+    found = _strongest(promising_forces(view, forces, np.asarray(mean)), weighed)
+    found.products.extend(found.evidence.under(one) for products in under[:-1] for one in disturbances(products))
     values = found.values(found.held)
     at = int(np.argmax(values))
     gain = float(np.max(values)) - found.before
@@ -117,28 +113,33 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
     # the prior standard deviation counts as one parameter, and every force is equally probable a priori
     alone = float(np.max(found.values([]))) - 0.5 * float(np.log(found.samples)) - float(np.log(len(forces)))
     heights, size, explained = found.heights(at)
-    predicts = found.predicts(dataclasses.replace(chosen, columns=beside(best), length=found.unit, shares=()))
-    force = dataclasses.replace(best, spread=float(f"{size:.6g}"))
+    significant = p_value < settings.SIGNIFICANCE and found.predicts()
+    force = dataclasses.replace(found.force, spread=float(f"{size:.6g}"))
     force, near = found.nearest(at, force, heights)
-    return Pattern(force, heights, near, p_value, predicts, alone, explained)
+    return Pattern(force, heights, near, p_value, significant, alone, explained)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Weighed:
-    """Products of the chosen columns, the first `count`, and of one force's hat functions, in units of their lengths.
+    """The evidence of the chosen columns, the first `count`, and of the hat functions of one `force`.
 
-    **Fields**: `unit`: (count + FINE,) the lengths. `varying`: the chosen numbers that differ by run.
+    **Fields**: `varying`: the chosen numbers that differ by run.
     """
 
-    products: Sequence[Products]
-    unit: np.ndarray
+    force: SmoothForce
+    evidence: Evidence
     count: int
     varying: Sequence[int]
 
     @property
+    def products(self) -> list[Products]:
+        """Under each disturbance, in units of the columns' lengths."""
+        return self.evidence.products
+
+    @property
     def length(self) -> np.ndarray:
         """(FINE,) of the hat functions."""
-        return self.unit[self.count :]
+        return self.evidence.length[self.count :]
 
     @property
     def held(self) -> list[int]:
@@ -177,14 +178,11 @@ class _Weighed:
         sums = inside.sums(fixed, self.own, smooth.weights)
         return inside.mixed(sums, products.known), sums, smooth
 
-    def predicts(self, evidence: Evidence) -> bool:
-        """Whether the force improves the prediction of parts of the recordings, under the best disturbance of each.
-
-        The products are of the columns of `evidence`: those of all forces would take much memory.
-        """
+    def predicts(self) -> bool:
+        """Whether the force improves the prediction of parts of the recordings, under the best disturbance of each."""
         found = []
         for products in self.products:
-            own = evidence.within(self.held, products)
+            own = self.evidence.within(self.held, products)
             unit = np.concatenate([np.ones(len(own.view.prior)), own.length])
             parts = own.view.products(own.columns.placed, products.disturbance).of(unit)
             found.append(self._predicted(products, parts))
@@ -223,12 +221,12 @@ class _Weighed:
         return with_numbers(force, numbers), 1.0 - lost / max(squares, 1e-300)
 
 
-def strongest(ranked: Sequence[Sequence[SmoothForce]], value: Callable[[SmoothForce], float]) -> SmoothForce:
-    """The force of largest `value` in the equation whose first force has the largest."""
-    first = [value(own[0]) for own in ranked]
-    best = int(np.argmax(first))
-    own = ranked[best]
-    return own[int(np.argmax([first[best], *map(value, own[1:])]))]
+def _strongest(ranked: Sequence[Sequence[SmoothForce]], weighed: Callable[[SmoothForce], _Weighed]) -> _Weighed:
+    """The force of most evidence in the equation whose first force has the most."""
+    value = lambda one: one.value
+    best = max((weighed(own[0]) for own in ranked), key=value)
+    more = next(own[1:] for own in ranked if own[0] is best.force)
+    return max(itertools.chain([best], map(weighed, more)), key=value)
 
 
 def most_explained(view: View, disturbance: Disturbance) -> float:
