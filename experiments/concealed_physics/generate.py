@@ -83,7 +83,7 @@ def _driven(
     drive = lambda held: Drive(*(jnp.asarray(a) for a in (starts, held[:, :-1], calm)))
     held, found = steer((), []), []
     for _ in range(1 + case.way.autopilot if truths else 0):
-        seen = Unabsorbed(vehicle, Drive(*(a[:-1] for a in drive(held))), sigma)
+        seen = Unabsorbed(vehicle, drive(held).of(slice(-1)), sigma)
         found = [seen.largest(truth, case.sizes) for truth in truths]
         held = steer(truths, [a for a, _ in found])
     return held, drive(held), [a for a, _ in found], [size for _, size in found]
@@ -133,15 +133,28 @@ def nearly(vehicle: AbstractVehicle, sigmas: Sequence[float | None], rng: np.ran
     return dataclasses.replace(guess, layout=dataclasses.replace(layout, outputs=outs))
 
 
-def write(folder: Path, file: AbstractVehicle, measured: np.ndarray, held: np.ndarray, states: np.ndarray) -> None:
-    """Write the vehicle `file` and a file a run: measured channels (R, K, c), commands (R, K, m), true states."""
+def write(
+    folder: Path,
+    file: AbstractVehicle,
+    measured: np.ndarray,
+    held: np.ndarray,
+    states: np.ndarray,
+    prescribed: np.ndarray | None = None,
+    interval: float = INTERVAL,
+) -> None:
+    """Write the vehicle `file` and a file a run, with a sample each `interval` s.
+
+    Of measured channels (R, K, c), commands (R, K, m), true states, and motions that the file prescribes, (R, K, p).
+    """
     layout = file.layout
     folder.mkdir(parents=True, exist_ok=True)
     write_vehicle(file, folder / "vehicle.toml")
-    t = INTERVAL * np.arange(measured.shape[1])
+    t = interval * np.arange(measured.shape[1])
     for run in range(len(measured)):
         columns = dict(zip(layout.channels, measured[run].T, strict=True))
         columns |= dict(zip(layout.held, held[run].T, strict=True))
+        if prescribed is not None:
+            columns |= {column: prescribed[run, :, i] for i, (_, column) in enumerate(layout.prescribed)}
         columns |= {column: _surroundings(name, layout, states[run]) for name, column in layout.environment}
         save(Recording(f"run{run + 1}", t, columns, "experiment"), folder / f"run{run + 1}.csv")
 

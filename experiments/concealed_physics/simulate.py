@@ -1,7 +1,7 @@
 """The generator's own integrator: Runge-Kutta steps, many to a sample, of the vehicle and what it conceals."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -19,11 +19,20 @@ STEPS = 10
 
 
 class Drive(NamedTuple):
-    """What acts on R runs: start (R, s), commands (R, K-1, m) held, pushes (R, K, n) linear between samples."""
+    """What acts on R runs: start (R, s), commands (R, K-1, m) held, pushes (R, K, n) linear between samples.
+
+    So are motions that the file prescribes, `prescribed` (R, K, c), if it has any. Samples are `interval` s apart.
+    """
 
     start: Array
     commands: Array
     push: Array
+    prescribed: Array | None = None
+    interval: float = INTERVAL
+
+    def of(self, runs: slice) -> "Drive":
+        """Of some of the runs."""
+        return Drive(*(None if part is None else part[runs] for part in self[:-1]), self.interval)
 
 
 @eqx.filter_jit
@@ -31,14 +40,15 @@ def states(
     vehicle: AbstractVehicle, truths: tuple[Truth, ...], sizes: Array, drive: Drive, steps: int = STEPS
 ) -> Array:
     """States at the samples, (R, K, s), of `vehicle` with `truths` of `sizes`."""
-    h = INTERVAL / steps
-    sample = _sample(vehicle, truths, sizes, h)
+    h = drive.interval / steps
 
-    def run(start: Array, commands: Array, push: Array) -> Array:
+    def run(start: Array, commands: Array, push: Array, prescribed: Array | None) -> Array:
+        moving = None if prescribed is None else lambda t: _at(t / drive.interval, prescribed)
+        sample = _sample(vehicle, truths, sizes, h, moving)
         held = jnp.repeat(commands, steps, axis=0)
         held = _deflections(vehicle, truths, sizes, held, h)
         part = jnp.arange(len(held) + 1) / steps
-        fine = jax.vmap(lambda p: jnp.interp(part, jnp.arange(len(push)), p), 1, 1)(push)
+        fine = _at(part, push)
         grouped = (h * jnp.arange(len(held)), held, fine[:-1], fine[1:])
         grouped = jax.tree.map(lambda x: x.reshape(-1, steps, *x.shape[1:]), grouped)
         begin = _begin(truths, start)
@@ -50,7 +60,12 @@ def states(
         after = jax.lax.scan(one, begin, grouped)[1]
         return jnp.concatenate([begin[None], after])[:, : len(start)]
 
-    return jax.vmap(run)(*drive)
+    return jax.vmap(run)(*drive[:-1])
+
+
+def _at(place: Array, values: Array) -> Array:
+    """`values` (K, n) at a place among their samples, between which they are linear."""
+    return jax.vmap(lambda column: jnp.interp(place, jnp.arange(len(values)), column), 1, -1)(values)
 
 
 @eqx.filter_jit
@@ -71,7 +86,7 @@ def steered(
         def one(k: Array, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
             now, moved, commands = carry
             moved = moved.at[k].set(now[: len(start)])
-            shown = _shown(vehicle, truths, sizes, moved, commands[:-1])[k] + errors[k]
+            shown = _shown(vehicle, truths, sizes, moved, commands[:-1], None, INTERVAL)[k] + errors[k]
             commands = commands.at[k].set(command(wanted[k], dict(zip(vehicle.layout.channels, shown, strict=True))))
             held = _deflections(vehicle, truths, sizes, jnp.repeat(commands, STEPS, axis=0), h)
             held = jax.lax.dynamic_slice_in_dim(held, k * STEPS, STEPS)
@@ -90,16 +105,26 @@ def _begin(truths: tuple[Truth, ...], start: Array) -> Array:
     return jnp.concatenate([start, jnp.zeros(sum(truth.memory for truth in truths))])
 
 
-def _sample(vehicle: AbstractVehicle, truths: tuple[Truth, ...], sizes: Array, h: float):
-    """The state a sample later, by steps of h s: their times, deflections, and pushes at their ends."""
+def _sample(
+    vehicle: AbstractVehicle,
+    truths: tuple[Truth, ...],
+    sizes: Array,
+    h: float,
+    moving: Callable[[Array], Array] | None = None,
+):
+    """The state a sample later, by steps of h s: their times, deflections, and pushes at their ends.
+
+    `moving` gives the prescribed motions at a time, if there are any.
+    """
     n = len(vehicle.layout.equations)
     inverse, damping = jnp.linalg.inv(vehicle.mass_matrix()), vehicle.damping_matrix()
-    extra = len(vehicle.layout.environment)
+    still = jnp.zeros(len(vehicle.layout.environment))
     count = sum(truth.memory for truth in truths)
 
     def rates(t: Array, state: Array, deflected: Array, push: Array) -> Array:
         own, memory = state[: state.shape[0] - count], state[state.shape[0] - count :]
-        motion = vehicle.motion(own, jnp.concatenate([deflected, jnp.zeros(extra), t[None]]))
+        around = still if moving is None else jnp.concatenate([moving(t), still])
+        motion = vehicle.motion(own, jnp.concatenate([deflected, around, t[None]]))
         force = vehicle.force(motion) + damping @ own[:n] + push
         memory_rates, at = [], 0
         for truth, size in zip(truths, sizes, strict=True):
@@ -111,7 +136,7 @@ def _sample(vehicle: AbstractVehicle, truths: tuple[Truth, ...], sizes: Array, h
             if truth.memory_rates is not None:
                 memory_rates.append(truth.memory_rates(size, moment))
         moved = vehicle.position_rates(motion)
-        positions = jnp.stack([moved[p] for p in vehicle.layout.positions])
+        positions = jnp.asarray([moved[p] for p in vehicle.layout.positions])
         return jnp.concatenate([inverse @ force, positions, *memory_rates])
 
     def step(state: Array, inputs: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
@@ -135,12 +160,21 @@ def _deflections(vehicle: AbstractVehicle, truths: Sequence[Truth], sizes: Array
     return held
 
 
-def _shown(vehicle: AbstractVehicle, truths: tuple[Truth, ...], sizes: Array, state: Array, commands: Array) -> Array:
+def _shown(
+    vehicle: AbstractVehicle,
+    truths: tuple[Truth, ...],
+    sizes: Array,
+    state: Array,
+    commands: Array,
+    prescribed: Array | None,
+    interval: float,
+) -> Array:
     """Channels of one run, (K, c)."""
-    t = INTERVAL * jnp.arange(len(state))
+    t = interval * jnp.arange(len(state))
     held = jnp.concatenate([commands, commands[-1:]])
-    surroundings = jnp.zeros((len(t), len(vehicle.layout.environment)))
-    motion = vehicle.motion(state, jnp.concatenate([held, surroundings, t[:, None]], axis=1))
+    beside = [] if prescribed is None else [prescribed]
+    signals = [held, *beside, jnp.zeros((len(t), len(vehicle.layout.environment))), t[:, None]]
+    motion = vehicle.motion(state, jnp.concatenate(signals, axis=1))
     channels = {c: jnp.broadcast_to(y, t.shape) for c, y in vehicle.channels(motion).items()}
     for truth, size in zip(truths, sizes, strict=True):
         if truth.sense is not None:
@@ -154,5 +188,6 @@ def outputs(
 ) -> tuple[Array, Array]:
     """What perfect sensors of that vehicle show, (R, K, c), and its states, (R, K, s)."""
     moved = states(vehicle, truths, sizes, drive, steps)
-    shown = jax.vmap(functools.partial(_shown, vehicle, truths, sizes))(moved, drive.commands)
+    show = functools.partial(_shown, vehicle, truths, sizes, interval=drive.interval)
+    shown = jax.vmap(show)(moved, drive.commands, prescribed=drive.prescribed)
     return shown, moved

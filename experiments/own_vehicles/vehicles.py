@@ -1,15 +1,21 @@
-"""The catalogue's vehicles, and the commands that their users would give them in a trial."""
+"""The catalogue's vehicles and three models of a user's own, and how each is driven in a trial."""
 
 import dataclasses
-import math
 from collections.abc import Callable
+from types import UnionType
 
 import numpy as np
 
 from experiments.concealed_physics.bodies import INTERVAL, body, commands, start_state
-from jaxsub.simulation.manoeuvres import square
-from jaxsub.vehicle import AbstractVehicle
-from jaxsub.vehicle.catalogue import bluerov2_heavy, kvlcc2, otter, remus_100_nonlinear
+from jaxsub.effects import AbstractActuator, TetherDrag
+from jaxsub.vehicle import AbstractVehicle, catalogue, own_model
+
+from . import drives
+from .models import DoublePendulum, Motor, Tank
+
+
+def _nothing(held: np.ndarray) -> np.ndarray:
+    return np.zeros((len(held), 0))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,88 +24,78 @@ class Trial:
 
     **Fields**
 
-    - `make()`: the vehicle of the catalogue. `samples` of `INTERVAL` s in each run.
+    - `make()`: the vehicle. `samples` of `interval` s in each of `runs`, of which the last is held out.
     - `drive(run, samples, rng)`: commands of each input, (samples, inputs), SI; no two runs alike.
     - `start(vehicle, rng)`: the state at the start, (s,).
+    - `prescribed(held)`: motions that the file prescribes by column (samples, c), SI, under these commands.
     """
 
     make: Callable[[], AbstractVehicle]
     samples: int
     drive: Callable[[int, int, np.random.Generator], np.ndarray]
     start: Callable[[AbstractVehicle, np.random.Generator], np.ndarray]
+    interval: float = INTERVAL
+    runs: int = 3
+    prescribed: Callable[[np.ndarray], np.ndarray] = _nothing
 
 
-def _levels(samples: int, hold: int, largest: float, rng: np.random.Generator) -> np.ndarray:
-    """A command of random levels, each held for `hold` samples and more."""
-    levels = np.zeros(samples)
-    at = 0
-    while at < samples:
-        length = int(rng.integers(hold, 3 * hold))
-        levels[at : at + length] = rng.uniform(-largest, largest)
-        at += length
-    return levels
+def _from(**known: float | tuple[float, float]) -> Callable[[AbstractVehicle, np.random.Generator], np.ndarray]:
+    """The state that is zero but for what is `known`, by name: a value, or between two."""
+
+    def start(vehicle: AbstractVehicle, rng: np.random.Generator) -> np.ndarray:
+        drawn = {name: rng.uniform(*at) if isinstance(at, tuple) else at for name, at in known.items()}
+        return np.array([drawn.get(name, 0.0) for name in vehicle.layout.states])
+
+    return start
 
 
-def _at(vehicle: AbstractVehicle, **known: float) -> np.ndarray:
-    """The state that is zero but for what is `known`, by name."""
-    return np.array([known.get(name, 0.0) for name in vehicle.layout.states])
+def _without(make: Callable[[], AbstractVehicle], kinds: type | UnionType) -> AbstractVehicle:
+    """A vehicle without its effects of those kinds, which the generator has in its own words."""
+    vehicle = make()
+    for label in [effect.label for effect in vehicle.effects if isinstance(effect, kinds)]:
+        vehicle = vehicle.without_effect(label)
+    ties = tuple(tie for tie in vehicle.layout.ties if "time_constant" not in tie.text)
+    return dataclasses.replace(vehicle, layout=dataclasses.replace(vehicle.layout, ties=ties))
 
 
-def _rov(run: int, samples: int, rng: np.random.Generator) -> np.ndarray:
-    """Demands ahead, across, down and of turning, given to eight thrusters; each has a little of its own too.
-
-    Nobody holds it upright, so they are small enough for its weight to do so.
-    """
-    ahead, across, turn = (_levels(samples, 15, size, rng) for size in (0.15, 0.15, 0.1))
-    level = [ahead - across - turn, ahead + across + turn, -ahead - across + turn, -ahead + across - turn]
-    upright = [-_levels(samples, 25, 0.2, rng)] * 4
-    own = [_levels(samples, 10, size, rng) for size in (*[0.04] * 4, *[0.015] * 4)]
-    return np.stack([*level, *upright], 1) + np.stack(own, 1)
-
-
-def _ship(run: int, samples: int, rng: np.random.Generator) -> np.ndarray:
-    """A zigzag, a circle and random rudder, at shaft speeds of several levels."""
-    t = INTERVAL * np.arange(samples)
-    rudder = (
-        square(t, rng.uniform(22.0, 34.0), rng.uniform(0.2, 0.5)),
-        square(t, rng.uniform(60.0, 80.0), rng.uniform(0.3, 0.5)),
-        _levels(samples, 20, 0.5, rng),
-    )[run % 3]
-    return np.stack([rudder, 2.0 * math.pi * (10.4 + _levels(samples, 90, 3.0, rng))], 1)
-
-
-def _catamaran(run: int, samples: int, rng: np.random.Generator) -> np.ndarray:
-    """Both shaft speeds, ahead with turns."""
-    ahead = 50.0 + _levels(samples, 40, 30.0, rng)
-    turn = _levels(samples, 12, 25.0, rng)
-    return np.stack([ahead + turn, ahead - turn], 1)
-
-
-def _torpedo(run: int, samples: int, rng: np.random.Generator) -> np.ndarray:
-    """Both planes of fins, small and fast enough to keep a hull that is not stable near its course."""
-    return np.stack([_levels(samples, 8, 0.12, rng), _levels(samples, 8, 0.06, rng)], 1)
-
-
-def _bare_otter() -> AbstractVehicle:
-    """Otter without the lags of its shafts, which the generator has in its own words."""
-    vehicle = otter()
-    for name in ("left", "right"):
-        vehicle = vehicle.without_effect(f"actuator-lag[{name}]")
-    return dataclasses.replace(vehicle, layout=_untied(vehicle.layout))
-
-
-def _untied(layout):
-    """The layout without ties to lags that are gone."""
-    return dataclasses.replace(layout, ties=tuple(tie for tie in layout.ties if "time_constant" not in tie.text))
+def _gliding(held: np.ndarray) -> np.ndarray:
+    """Pitch and roll of a glider, rad: nose down while it is heavy."""
+    return np.column_stack([0.4 * held[:, 0] / 2e-4, np.zeros(len(held))])
 
 
 TRIALS = {
-    "BlueROV2 Heavy": Trial(bluerov2_heavy, 300, _rov, lambda v, rng: _at(v, z=8.0 + rng.uniform(-1.0, 1.0))),
-    "KVLCC2": Trial(kvlcc2, 600, _ship, lambda v, rng: _at(v, u=1.0, psi=rng.uniform(-3.0, 3.0))),
-    "Otter": Trial(_bare_otter, 400, _catamaran, lambda v, rng: _at(v, u=1.0, psi=rng.uniform(-3.0, 3.0))),
-    "REMUS 100": Trial(remus_100_nonlinear, 200, _torpedo, lambda v, rng: _at(v, u=1.54, z=10.0)),
+    "BlueROV2 Heavy": Trial(catalogue.bluerov2_heavy, 300, drives.rov, _from(z=(7.0, 9.0))),
+    "KVLCC2": Trial(catalogue.kvlcc2, 600, drives.ship, _from(u=1.0, psi=(-3.0, 3.0))),
+    "Otter": Trial(
+        lambda: _without(catalogue.otter, AbstractActuator), 400, drives.catamaran, _from(u=1.0, psi=(-3.0, 3.0))
+    ),
+    "REMUS 100": Trial(catalogue.remus_100_nonlinear, 200, drives.auv, _from(u=1.54, z=10.0)),
     "NPS AUV II": Trial(
         lambda: body("nps"), 800, lambda run, samples, rng: commands("nps", run, samples, rng),
         lambda v, rng: start_state("nps", v, rng),
+    ),
+    "SUBOFF": Trial(catalogue.suboff, 75, drives.submarine, _from(u=3.3, z=20.0), runs=6),
+    "Torpedo": Trial(
+        lambda: _without(catalogue.torpedo, AbstractActuator), 400, drives.torpedo,
+        _from(u=1.8, psi=(-3.0, 3.0), z=20.0),
+    ),
+    "RexROV": Trial(
+        lambda: _without(catalogue.rexrov, AbstractActuator | TetherDrag), 400, drives.work_class, _from(z=(48.0, 52.0))
+    ),
+    "Seaglider": Trial(
+        catalogue.seaglider, 400, drives.volume, _from(u=0.2, z=(20.0, 40.0)), interval=4.0, runs=6,
+        prescribed=_gliding,
+    ),
+    "Slocum": Trial(catalogue.slocum, 600, drives.ballast, _from(u=0.3, z=(20.0, 40.0)), interval=1.0, runs=4),
+    "Motor": Trial(
+        lambda: own_model(Motor(R=2.0, L=0.1, k=0.5, J=0.02)), 400, drives.random(15, 0.0, 12.0), _from(),
+        interval=0.02,
+    ),
+    "Tank": Trial(
+        lambda: own_model(Tank(area=0.5, hole=1e-3)), 400, drives.random(20, 2e-3, 1.5e-3), _from(level=(0.1, 0.3)),
+        interval=2.0,
+    ),
+    "Double pendulum": Trial(
+        lambda: own_model(DoublePendulum(m=0.3, b=0.02)), 400, drives.random(15, 0.0, 0.6), _from(), interval=0.02
     ),
 }  # fmt: skip
