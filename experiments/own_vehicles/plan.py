@@ -66,7 +66,7 @@ CASES = (
     Case("rov-added-mass", "BlueROV2 Heavy", "added mass in heave 30 % less", factors={"Z_wdot": 0.7}),
     Case("rov-none", "BlueROV2 Heavy", "nothing"),
     Case("remus-drag", "REMUS 100", "biofouled: surge drag 40 % more", factors={"X_u|u|": 1.4}),
-    Case("suboff-added-mass", "SUBOFF", "added mass in heave 30 % less", factors={"Z_wdot": 0.7}),
+    Case("suboff-lag", "SUBOFF", "stern plane lags by 0.4 s", (slow("stern_plane"), 0.4)),
     Case("torpedo-compass-delay", "Torpedo", "compass 0.6 s late", (delayed("psi"), 0.6)),
     Case("rexrov-tether", "RexROV", "tether of 30 mm", (towed(), 18.504)),
     Case("seaglider-drift", "Seaglider", "buoyancy falls from dive to dive, by 0.3 N in all",

@@ -47,6 +47,7 @@ from .motion import (
     by_name,
     velocities,
 )
+from .polynomial import PolynomialTerm
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
 from .registry import VOCABULARY, candidates, from_script, looked_at, vocabulary
 from .run_variation import RunVariation
@@ -102,6 +103,7 @@ __all__ = [
     "Hysteresis",
     "MassShift",
     "Motion",
+    "PolynomialTerm",
     "Power",
     "PropellerAsymmetry",
     "PropellerRace",

@@ -11,9 +11,12 @@ from ..parameters import number
 from .base import AbstractForce, amplitude, shape
 from .motion import Facts, Motion, Signal
 
+# whose equations have a rate of their own, which friction opposes
+_WITH_RATES = ("mechanism", "model")
+
 
 class AbstractCoordinateForce(AbstractForce):
-    """A force in the equation of one coordinate of a mechanism."""
+    """A force in the equation of one coordinate of a mechanism, or of one state of a user's own model."""
 
     equation: eqx.AbstractVar[str]
 
@@ -40,8 +43,8 @@ class CoulombFriction(AbstractCoordinateForce):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[CoulombFriction]":
-        """One for each coordinate of a mechanism."""
-        if facts.kind != "mechanism":
+        """One for each coordinate of a mechanism, or state of a user's own model."""
+        if facts.kind not in _WITH_RATES:
             return []
         return [cls(e, float(f"{facts.rate_scale[e] / 50.0:.3g}")) for e in facts.equations]
 
@@ -75,8 +78,8 @@ class AsymmetricDamping(AbstractCoordinateForce):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[AsymmetricDamping]":
-        """One for each coordinate of a mechanism."""
-        return [cls(e) for e in facts.equations] if facts.kind == "mechanism" else []
+        """One for each coordinate of a mechanism, or state of a user's own model."""
+        return [cls(e) for e in facts.equations] if facts.kind in _WITH_RATES else []
 
     @property
     def expression(self) -> str:

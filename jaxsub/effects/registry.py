@@ -26,6 +26,7 @@ from .hydrostatics import BuoyancyError, DensityStratification, HullCompressibil
 from .mechanisms import AsymmetricDamping, CoulombFriction, CubicStiffness, Saturation
 from .memory import FluidMemory, Hysteresis
 from .motion import Facts
+from .polynomial import PolynomialTerm
 from .propulsion import PropellerAsymmetry, PropellerRace, PropellerTorque, ThrusterCrossCoupling
 from .run_variation import RunVariation
 from .script import executed
@@ -86,11 +87,11 @@ VOCABULARY: tuple[type[AbstractEffect], ...] = (
 
 
 def vocabulary() -> tuple[type[AbstractEffect], ...]:
-    """`VOCABULARY`, `RunVariation`, and what installed packages declare as entry points of the group `jaxsub.effects`.
+    """`VOCABULARY`, `RunVariation`, `PolynomialTerm`, and the entry points `jaxsub.effects` of installed packages.
 
     **Raises** `InputError` for an entry point that cannot be loaded, is no effect or bears a name that is taken.
     """
-    kinds: list[type[AbstractEffect]] = [*VOCABULARY, RunVariation]
+    kinds: list[type[AbstractEffect]] = [*VOCABULARY, RunVariation, PolynomialTerm]
     for entry in metadata.entry_points(group=GROUP):
         where = f"entry point {entry.name} of {GROUP}"
         try:

@@ -100,8 +100,8 @@ class OwnModel(AbstractVehicle):
 
     @property
     def fixed_gains(self) -> tuple[str, ...]:
-        """None: which number scales an input is not known."""
-        return ()
+        """All: which number scales an input is not known, so the recordings tell whether one does."""
+        return tuple(name for name, _ in self.layout.inputs)
 
     @property
     def actuation(self) -> Equations:
