@@ -122,10 +122,10 @@ class Problem(Coordinates):
         """The vehicle that the coordinates `y` of the parameters stand for."""
         return self.vehicle_with(self.theta(y))
 
-    def vehicle_with(self, theta: Float[Array, " p"]) -> AbstractVehicle:
-        """The vehicle of physical parameters (p,), SI."""
+    def vehicle_with(self, estimate: Float[Array, " p"]) -> AbstractVehicle:
+        """The vehicle whose free numbers are an `estimate` (p,), SI."""
         # by NumPy: to cut an array of JAX would be a program for each place
-        each = theta if isinstance(theta, Tracer) else jax.device_put([*np.asarray(theta)])
+        each = estimate if isinstance(estimate, Tracer) else jax.device_put([*np.asarray(estimate)])
         names = [row.name for row in self.vehicle.layout.free]
         return self.vehicle.with_values(dict(zip(names, each, strict=True)))
 
