@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..effects import AbstractActuator, AbstractEffect, AbstractInstrument, AbstractSensor
+from ..effects import AbstractActuator, AbstractEffect, AbstractSensor
 from ..errors import InputError, require_known
 from ..filter.model import linearised
 from ..methods import jittable
@@ -173,7 +173,7 @@ class Plant(eqx.Module):
         shown, motion = self.vehicle.truth(now, state, signals)
         after: dict[int, Array] = {}
         for i, effect in enumerate(self.vehicle.effects):
-            if not isinstance(effect, AbstractInstrument):
+            if not self.vehicle.shows(effect):
                 continue
             if not isinstance(effect, AbstractSensor) or not effect.remembers:
                 shown |= effect.show(now, shown, motion)

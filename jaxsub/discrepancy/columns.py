@@ -30,6 +30,7 @@ from ..likelihood import Columns, padded_width
 from ..programs import compiled
 from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle
+from .prescribed import on_prescribed, prescribed_change, prescribed_slopes
 from .view import View
 
 # amplitude of an effect by which its slope is taken, SI: effects are linear in theirs, some only about zero
@@ -43,17 +44,21 @@ _AT_ONCE = 64
 class Part(NamedTuple):
     """A column where it acts: a force at both ends of each interval, or a change of channels, SI.
 
-    **Fields**: `at`: (m,) the equations or channels. `value`: (2, R, K-1, m) or (R, K, m) what it is there.
+    **Fields**
+
+    - `at`: (m,) the equations or channels. `value`: (2, R, K-1, m) or (R, K, m) what it is there.
+    - `step`: (R, K-1, s) what it adds to each step of the state beside a change of channels, if it is no force.
     """
 
     at: np.ndarray
     value: np.ndarray
+    step: np.ndarray | None = None
 
     @classmethod
-    def of(cls, whole: np.ndarray) -> "Part":
+    def of(cls, whole: np.ndarray, step: np.ndarray | None = None) -> "Part":
         """Of a column in all equations, or channels, the last axis."""
         at = np.flatnonzero(whole.reshape(-1, whole.shape[-1]).any(axis=0))
-        return cls(at, np.ascontiguousarray(whole[..., at]))
+        return cls(at, np.ascontiguousarray(whole[..., at]), step)
 
     @property
     def is_force(self) -> bool:
@@ -119,9 +124,11 @@ class EffectColumns:
             for place, i in enumerate(some):
                 ends[..., self.parts[i].at, place] = self.parts[i].value[:, runs]
             forcing[..., some] = G @ np.concatenate([*ends], axis=2)
-        for i, (at, value) in enumerate(self.parts):
+        for i, (at, value, step) in enumerate(self.parts):
             if not self.parts[i].is_force:
                 onto.shown[..., at, i] = np.where(measured[..., at], value[runs] / sigma[at], 0.0)
+            if step is not None:
+                forcing[..., i] = step[runs]
 
 
 def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple[EffectColumns, list[list[int]]]:
@@ -148,19 +155,32 @@ def columns_of(view: View, forces: Iterable[np.ndarray], outputs: Iterable[np.nd
     return EffectColumns(view, tuple(map(Part.of, itertools.chain(forces, outputs))))
 
 
+def prescribed_columns(view: View, effects: Sequence[AbstractEffect]) -> EffectColumns:
+    """Columns of effects on prescribed motions with their own parameters."""
+    sizes = [sum(numbers(effect).values()) for effect in effects]
+    slopes = zip(sizes, prescribed_slopes(view, effects), strict=True)
+    return EffectColumns(view, tuple(Part.of(size * shown, size * step) for size, (step, shown) in slopes))
+
+
 @quietly
 def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[Part]]:
     """Each column of each effect, a force or a change of the channels."""
-    tried = []
-    for effect in effects:
+    tried, before = [], [on_prescribed(view.vehicle, effect) for effect in effects]
+    for effect, apart in zip(effects, before, strict=True):
         names = amplitudes(effect)
+        if apart:
+            tried.append([])
+            continue
         more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
         small = [with_numbers(effect, {name: _SMALL * (name == own) for name in names}) for own in names]
         tried.append(small or [effect, with_numbers(effect, more)])
     # one after the other: only where they act are they kept
     made = _differences(view, [one for own in tried for one in own])
-    columns = []
+    columns, slopes_before = [], iter(prescribed_slopes(view, list(itertools.compress(effects, before))))
     for effect, own in zip(effects, tried, strict=True):
+        if not own:
+            columns.append([Part.of(shown, step) for step, shown in itertools.islice(slopes_before, 1)])
+            continue
         found = [next(made) for _ in own]
         slopes = amplitudes(effect)
         own = [c / _SMALL for c in found] if slopes else [found[0], (found[1] - found[0]) / _NUDGE]
@@ -273,6 +293,10 @@ def plausible(view: View, effect: AbstractEffect) -> bool:
         return all(
             abs(numbers(effect)[name]) <= effect.reach * view.vehicle.layout.length for name in amplitudes(effect)
         )
+
+    if on_prescribed(view.vehicle, effect):
+        change, motion = prescribed_change(view, effect)
+        return float(np.ptp(change)) <= float(np.ptp(motion))
 
     def shown(channel: str) -> float:
         measured = view.measured(channel)

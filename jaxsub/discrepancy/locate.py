@@ -14,10 +14,11 @@ from ..effects import AbstractEffect, AbstractInstrument, Motion, RunVariation, 
 from ..likelihood import Disturbance
 from ..recording import Recording
 from . import settings
-from .columns import columns_of, differences
+from .columns import columns_of, differences, prescribed_columns
 from .diagnosis import ForceTrace, Location, Regime
 from .effect_forces import Forces
 from .evidence import Evidence
+from .prescribed import on_prescribed
 from .process_noise import NoiseSignal
 from .regime import INCIDENCE, regime, regime_variables
 from .selector import Scan
@@ -99,6 +100,8 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
     equations, channels = view.vehicle.layout.equations, view.vehicle.layout.channels
     varying = [effect for effect in effects if isinstance(effect, RunVariation)]
     effects = [effect for effect in effects if not isinstance(effect, RunVariation)]
+    before = [effect for effect in effects if on_prescribed(view.vehicle, effect)]
+    effects = [effect for effect in effects if not on_prescribed(view.vehicle, effect)]
     for effect, whole in zip(effects, differences(view, effects), strict=True):
         if isinstance(effect, AbstractInstrument):
             shown += [(f"sensor:{c}", whole * (np.asarray(channels) == c)) for c in effect.channels]
@@ -106,7 +109,7 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
             pushed.append((effect.where[0], whole))
         else:
             pushed += [(e, whole * (np.arange(len(equations)) == i)) for i, e in enumerate(equations)]
-    columns = columns_of(view, [c for _, c in pushed], [c for _, c in shown])
+    columns = columns_of(view, [c for _, c in pushed], [c for _, c in shown]) + prescribed_columns(view, before)
     free = [row.name for row in view.vehicle.layout.free]
     varied = [free.index(effect.number) for effect in varying]
     evidence = Evidence.of(view, columns, [disturbance], varied)
@@ -116,7 +119,8 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
         size = numbers(effect)["spread"] * view.length[varied[k]]
         part = float(np.trace(evidence.products[0].left_by_run([], k))) * size**2
         found |= {place: found.get(place, 0.0) + part / len(effect.where) for place in effect.where}
-    for (place, _), part in zip([*pushed, *shown], np.maximum(left, 0.0), strict=True):
+    places = [*(place for place, _ in (*pushed, *shown)), *(effect.where[0] for effect in before)]
+    for place, part in zip(places, np.maximum(left, 0.0), strict=True):
         found[place] = found.get(place, 0.0) + float(part)
     total = max(sum(found.values()), 1e-300)
     return {place: part / total for place, part in found.items()}

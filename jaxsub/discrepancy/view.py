@@ -270,6 +270,7 @@ def facts(view: View) -> Facts:
         density=view.vehicle.density,
         speed=view.vehicle.speed,
         varying=_varying(view),
+        prescribed=tuple(name for name, _ in layout.prescribed if body and name not in layout.channels),
     )
 
 

@@ -260,6 +260,8 @@ class AbstractSensor(AbstractInstrument):
 
     # whether it shows something of earlier samples, which a filter or an autopilot does not keep
     remembers: ClassVar[bool] = False
+    # whether `undone` says what was true at each sample by itself, as it must of a motion that the file prescribes
+    of_prescribed: ClassVar[bool] = False
 
     @abc.abstractmethod
     def measure(
@@ -289,8 +291,11 @@ class AbstractSensor(AbstractInstrument):
             raise InputError(self.label, "does not say how many samples it remembers", "define remembered")
         return 0
 
-    def undone(self, times: Float[Array, " *k"], recorded: Float[Array, " *k"]) -> Float[Array, " *k"]:
-        """`recorded`, of one run, brought to the times at which it was true; only what `remembers` has to say how."""
+    def undone(self, times: Float[Signal, " *k"], recorded: Float[Signal, " *k"]) -> Float[Signal, " *k"]:
+        """What was true at `times` (s from the run's start) by what was `recorded`, of one run.
+
+        Of what `remembers` only, brought to the times at which it was true, and of what is `of_prescribed`.
+        """
         return recorded
 
 

@@ -138,6 +138,7 @@ class Facts(eqx.Module):
       offsets of sensors such as `psi.offset`.
       An actuator by a name of its own has those of its force; a control surface has one such as `N_uu_port_fin`.
     - `fixed_gains`: the vehicle's actuators whose force no free number of its own scales as a whole.
+    - `prescribed`: motions that the vehicle takes from the recordings and that are no channels.
     - `varying`: numbers that may differ by run, each with its SI unit and what feels it.
     - `tones`: frequencies (rad/s) at which what each equation misses stands out, inside `wave_band`; `frequencies`: how
       many they were chosen among.
@@ -167,6 +168,12 @@ class Facts(eqx.Module):
     density: float = STANDARD_DENSITY
     speed: float = 0.0
     varying: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
+    prescribed: tuple[str, ...] = ()
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """All that instruments recorded of the motion: channels, and prescribed motions."""
+        return (*self.channels, *self.prescribed)
 
     @property
     def shown(self) -> dict[str, str]:

@@ -52,7 +52,7 @@ class SensorDelay(AbstractSensor):
         """The samples of the delay."""
         return math.ceil(max(float(self.tau), 0.0) / interval)
 
-    def undone(self, times: Float[Array, " *k"], recorded: Float[Array, " *k"]) -> Float[Array, " *k"]:
+    def undone(self, times: Float[Signal, " *k"], recorded: Float[Signal, " *k"]) -> Float[Signal, " *k"]:
         """What was shown a while later."""
         return jnp.interp(times + jnp.maximum(self.tau, 0.0), times, recorded)
 

@@ -16,14 +16,15 @@ class SensorBias(AbstractSensor):
 
     name: ClassVar[str] = "sensor-bias"
     family: ClassVar[str] = "sensors"
+    of_prescribed: ClassVar[bool] = True
     channel: str = eqx.field(static=True)
     bias: Array = amplitude("1")
     quantity: str = of_output()
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorBias]":
-        """One for each channel."""
-        return [cls(channel, quantity=quantity_of(channel, facts.quantities)) for channel in facts.channels]
+        """One for each channel and each prescribed motion."""
+        return [cls(channel, quantity=quantity_of(channel, facts.quantities)) for channel in facts.recorded]
 
     def units(self) -> dict[str, str]:
         """The channel's own."""
@@ -45,20 +46,25 @@ class SensorBias(AbstractSensor):
         """The biased output."""
         return namespace(times, self.bias).asarray(outputs[self.channel] + self.bias)
 
+    def undone(self, times: Float[Signal, " *k"], recorded: Float[Signal, " *k"]) -> Float[Signal, " *k"]:
+        """The motion that was `recorded`, without it."""
+        return recorded - self.bias
+
 
 class SensorScale(AbstractSensor):
     r"""A wrong scale: $z = (1 + s)\,y$. Source: Titterton and Weston (2004), §4."""
 
     name: ClassVar[str] = "sensor-scale"
     family: ClassVar[str] = "sensors"
+    of_prescribed: ClassVar[bool] = True
     channel: str = eqx.field(static=True)
     # a sensor that is off by more than what it should show is no sensor of it, but a way out
     scale: Array = amplitude("1", most=1.0)
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorScale]":
-        """One for each channel."""
-        return [cls(channel) for channel in facts.channels]
+        """One for each channel and each prescribed motion."""
+        return [cls(channel) for channel in facts.recorded]
 
     @property
     def term(self) -> str:
@@ -76,20 +82,25 @@ class SensorScale(AbstractSensor):
         """The scaled output."""
         return namespace(times, self.scale).asarray((1.0 + self.scale) * outputs[self.channel])
 
+    def undone(self, times: Float[Signal, " *k"], recorded: Float[Signal, " *k"]) -> Float[Signal, " *k"]:
+        """The motion that was `recorded`, without it."""
+        return recorded / (1.0 + self.scale)
+
 
 class SensorDrift(AbstractSensor):
     r"""An error that grows with the time of the run: $z = y + d\,t$. Source: Titterton and Weston (2004), §4."""
 
     name: ClassVar[str] = "sensor-drift"
     family: ClassVar[str] = "sensors"
+    of_prescribed: ClassVar[bool] = True
     channel: str = eqx.field(static=True)
     drift: Array = amplitude("1/s")
     quantity: str = of_output()
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[SensorDrift]":
-        """One for each channel."""
-        return [cls(channel, quantity=quantity_of(channel, facts.quantities)) for channel in facts.channels]
+        """One for each channel and each prescribed motion."""
+        return [cls(channel, quantity=quantity_of(channel, facts.quantities)) for channel in facts.recorded]
 
     def units(self) -> dict[str, str]:
         """The channel's own, per second."""
@@ -105,3 +116,7 @@ class SensorDrift(AbstractSensor):
     ) -> Float[Signal, " *k"]:
         """The drifting output."""
         return namespace(times, self.drift).asarray(outputs[self.channel] + self.drift * times)
+
+    def undone(self, times: Float[Signal, " *k"], recorded: Float[Signal, " *k"]) -> Float[Signal, " *k"]:
+        """The motion that was `recorded`, without it."""
+        return recorded - self.drift * times

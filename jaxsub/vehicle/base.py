@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 from collections.abc import Collection, Mapping
-from typing import Any, Self
+from typing import Any, Self, TypeGuard
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -289,9 +289,13 @@ class AbstractVehicle(eqx.Module):
         """What the sensors show at `times`, s from the run's start."""
         shown, motion = self.truth(times, state, signals)
         for effect in self.effects:
-            if isinstance(effect, AbstractInstrument):
+            if self.shows(effect):
                 shown |= effect.show(times, shown, motion)
         return stack(shown, self.layout.channels, times)
+
+    def shows(self, effect: AbstractEffect) -> TypeGuard[AbstractInstrument]:
+        """Whether an effect is one on outputs, and not on a motion that the file prescribes."""
+        return isinstance(effect, AbstractInstrument) and set(effect.channels) <= set(self.layout.channels)
 
     def truth(
         self, times: Float[Array, " *k"], state: Float[Array, "*k s"], signals: Float[Array, "*k m"]

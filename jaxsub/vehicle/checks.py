@@ -168,9 +168,18 @@ def check_effects(vehicle: AbstractVehicle, where: str) -> None:
             hint = nearest(effect.actuator, [n for n, _ in layout.inputs]) or "an actuator of [inputs]"
             raise InputError(place, f"no actuator {effect.actuator}", f"use {hint}")
         for channel in effect.channels if isinstance(effect, AbstractInstrument) else ():
-            if channel not in layout.channels:
-                hint = nearest(channel, list(layout.channels)) or "a channel of [outputs]"
-                raise InputError(place, f"no channel {channel}", f"use {hint}")
+            _check_channel(effect, channel, layout, place)
+
+
+def _check_channel(effect: AbstractInstrument, channel: str, layout: Layout, place: str) -> None:
+    prescribed = [name for name, _ in layout.prescribed]
+    if channel in layout.channels or (channel in prescribed and getattr(effect, "of_prescribed", False)):
+        return
+    if channel in prescribed:
+        remedy = "delete it, or measure that motion under [outputs]"
+        raise InputError(place, f"cannot be on {channel}, which is prescribed", remedy)
+    hint = nearest(channel, [*layout.channels, *prescribed]) or "a channel of [outputs]"
+    raise InputError(place, f"no channel {channel}", f"use {hint}")
 
 
 def check_variation(vehicle: AbstractVehicle, where: str) -> None:

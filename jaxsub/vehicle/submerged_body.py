@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..arrays import Values
-from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, AbstractFlow, Motion, Signal
+from ..effects import EQUATIONS, VELOCITIES, AbstractEffect, AbstractFlow, AbstractSensor, Motion, Signal
 from ..effects.environment import stream
 from ..effects.hull import coriolis
 from ..parameters import number
@@ -117,6 +117,9 @@ class SubmergedBody(AbstractVehicle):
         shape = state.shape[:-1] if self.spreads else ()
         moved, buoyancy, cruise = sample_by_sample(self._of_run, shape, known, environment)
         known |= moved
+        for effect in self.effects:
+            if isinstance(effect, AbstractSensor) and effect.channel in moved and not self.shows(effect):
+                known[effect.channel] = effect.undone(time, known[effect.channel])
         zero = jnp.zeros_like(state[..., 0])
         rates = {e: known.get(VELOCITIES[e], zero) for e in EQUATIONS}
         if "u" not in known:
