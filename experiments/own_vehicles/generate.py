@@ -10,7 +10,9 @@ import numpy as np
 
 from experiments.concealed_physics.generate import nearly, write
 from experiments.concealed_physics.simulate import Drive, outputs
+from jaxsub.parameters import Parameter
 from jaxsub.vehicle import AbstractVehicle
+from jaxsub.vehicle.coefficient_units import coefficient_unit
 
 from .plan import CASES, Case
 from .vehicles import TRIALS
@@ -39,7 +41,7 @@ def generate(case: Case, folder: Path) -> dict:
     sigma = np.array([output.sigma for output in known.layout.outputs])
     measured = ideal + sigma * rng.standard_normal(ideal.shape)
     file = nearly(case.file(_freed(known, tuple(own))), sigma.tolist(), rng)
-    write(folder, file.with_values(own), measured, held, states, moved, trial.interval)
+    write(folder, file.with_values(own), measured, held, states, case.recorded(moved), trial.interval)
     floor = np.sqrt(np.mean(((measured - ideal)[-1] / sigma) ** 2, axis=0))
     return {
         "names": [truth.name for truth in truths],
@@ -57,6 +59,8 @@ def _true(case: Case, own: Mapping[str, Any], run: int) -> dict[str, Any]:
 
 
 def _freed(vehicle: AbstractVehicle, names: tuple[str, ...]) -> AbstractVehicle:
-    """The vehicle with those numbers free too."""
-    rows = (dataclasses.replace(row, free=row.free or row.name in names) for row in vehicle.layout.parameters)
-    return dataclasses.replace(vehicle, layout=dataclasses.replace(vehicle.layout, parameters=tuple(rows)))
+    """The vehicle with those numbers free too, also those of `[body]` that the catalogue gives no more than a value."""
+    rows = {row.name: row for row in vehicle.layout.parameters}
+    rows |= {name: Parameter(name, coefficient_unit(name)) for name in names if name not in rows}
+    free = tuple(dataclasses.replace(row, free=row.free or name in names) for name, row in rows.items())
+    return dataclasses.replace(vehicle, layout=dataclasses.replace(vehicle.layout, parameters=free))

@@ -5,6 +5,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from experiments.concealed_physics.truth import Truth
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import kvlcc2
@@ -14,6 +16,7 @@ from .truths import (
     delayed,
     drifting,
     dry,
+    off,
     out_of_the_race,
     shrinking,
     slow,
@@ -35,6 +38,7 @@ class Case:
     - `truth`: the effect and its size; none where a number is what differs, or nothing.
     - `factors`: by which numbers of the true vehicle differ from the catalogue's, which the file has and leaves free.
     - `drifts`: what is added to such a number in each run, SI.
+    - `recorded(prescribed)`: what sensors make of the motions that the file prescribes, (…, c), SI.
     - `file(vehicle)`: what the owner's file has of the vehicle, where that is not all.
     """
 
@@ -45,6 +49,7 @@ class Case:
     factors: Mapping[str, float] = dataclasses.field(default_factory=dict)
     drifts: Mapping[str, Sequence[float]] = dataclasses.field(default_factory=dict)
     file: Callable[[Any], AbstractVehicle] = lambda vehicle: vehicle
+    recorded: Callable[[np.ndarray], np.ndarray] = lambda prescribed: prescribed
 
 
 CASES = (
@@ -75,6 +80,8 @@ CASES = (
     Case("motor-friction", "Motor", "dry friction", (dry("speed"), 10.0)),
     Case("tank-lag", "Tank", "pump lags by 30 s", (slow("pump"), 30.0)),
     Case("pendulum-delay", "Double pendulum", "encoder of the lower rod 0.05 s late", (delayed("two"), 0.05)),
+    Case("seaglider-pitch", "Seaglider", "pitch sensor 1° off", (off("theta"), math.radians(1.0)),
+         recorded=lambda moved: moved + np.array([math.radians(1.0), 0.0])),
     Case("torpedo-none", "Torpedo", "nothing"),
     Case("seaglider-none", "Seaglider", "nothing"),
     Case("motor-none", "Motor", "nothing"),

@@ -35,6 +35,11 @@ def delayed(channel: str) -> Truth:
     return sensor("sensor-delay", (channel,), lambda a, t, c: {channel: late(a, t, c[channel])})
 
 
+def off(motion: str) -> Truth:
+    """A sensor of a prescribed motion that is off: what it shows is the case's `recorded`."""
+    return Truth("sensor-bias", motion, "sensors", (f"sensor:{motion}",), math.inf)
+
+
 def turned() -> Truth:
     """A DVL that is turned about the vertical, by rad."""
     shown = lambda a, t, c: {

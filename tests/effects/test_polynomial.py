@@ -61,13 +61,15 @@ def test_models_of_a_user_have_every_term_and_other_vehicles_none():
 def test_file_keeps_a_term_and_refuses_one_of_a_signal_that_is_not_there(tmp_path):
     path = tmp_path / "pair.py"
     path.write_text(
-        "import jaxsub as js\nfrom jaxtyping import Array\nclass Pair(js.Model):\n    states, inputs = ('a', 'b'), ('push',)\n"
+        "import jaxsub as js\nfrom jaxtyping import Array\nclass Pair(js.Model):\n"
+        "    states, inputs = ('a', 'b'), ('push',)\n"
         "    fade: Array\n    def rates(self, state, inputs, time):\n"
         "        return {'a': inputs['push'] - self.fade * state['a'], 'b': -self.fade * state['b']}\n"
     )
     text = (
-        'schema = 1\nname = "pair"\nkind = "model"\nclass = "pair.py:Pair"\ncoefficients.fade = 0.8\ninputs.push = "u"\n'
-        'outputs.a.sigma = 0.1\n[[effects]]\neffect = "polynomial-term"\nequation = "b"\nproduct = "a*push"\n'
+        'schema = 1\nname = "pair"\nkind = "model"\nclass = "pair.py:Pair"\n'
+        'coefficients.fade = 0.8\ninputs.push = "u"\noutputs.a.sigma = 0.1\n'
+        '[[effects]]\neffect = "polynomial-term"\nequation = "b"\nproduct = "a*push"\n'
         "parameters = { c = 0.7 }\n"
     )
     file = tmp_path / "pair.toml"
