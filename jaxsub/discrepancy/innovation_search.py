@@ -78,17 +78,23 @@ class Iterate:
 
 @dataclasses.dataclass(frozen=True)
 class InnovationSearch:
-    """The search on the recordings of a `problem`, whose filter begins at initial states of mean `start` (R, s)."""
+    """The search on the recordings of a `problem`.
+
+    The filter begins at initial states of mean `start` (R, s), and follows a path from there by the covariance `begin`
+    (R, s, s), by default that of the problem's priors.
+    """
 
     problem: Problem
     start: Array
+    begin: Float[np.ndarray, "r s s"] | None = None
 
     @quietly
     def evaluate(self, vehicle: AbstractVehicle, disturbance: Disturbance) -> Iterate:
         """The innovations of a vehicle under a disturbance, and their sensitivities."""
         problem, names = self.problem, [row.name for row in vehicle.layout.free]
         disturbance = jax.tree.map(np.asarray, disturbance)
-        followed = filter_runs(vehicle, problem.runs, problem.sigma, disturbance, self.start, problem.start_std)
+        known = self.start, problem.start_std, self.begin
+        followed = filter_runs(vehicle, problem.runs, problem.sigma, disturbance, *known)
         found = np.asarray(followed.products)[: 1 + len(names), : 1 + len(names)]
         length = root_or_one(np.diag(found)[1:])
         unit = np.concatenate([np.ones(1), length])

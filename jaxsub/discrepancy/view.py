@@ -129,7 +129,7 @@ def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVe
     """
     problem, rms = with_wide_priors(fit.problem), fit.rms
     much = max(rms.values()) > settings.LARGE_ERROR
-    search = InnovationSearch(problem, problem.guess if much else _trusted(fit))
+    search = InnovationSearch(problem, problem.guess) if much else InnovationSearch(problem, *_trusted(fit))
     guess = dataclasses.replace(guessed(fit), noise=_white(fit))
     vehicles = [fit.vehicle, *([near] if much and near is not None else [])]
     best = lambda pairs: by_cost(search.evaluate(*pair) for pair in pairs)[0]
@@ -159,11 +159,17 @@ def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: I
 
 
 @quietly
-def _trusted(fit: Solution) -> Array:
-    """The initial states of a fit, but for runs' deviations: the filter is to show how well those are predicted."""
-    layout = fit.vehicle.layout
-    fitted = [name not in layout.deviations for name in layout.states]
-    return jax.device_put(np.where(fitted, np.asarray(fit.start), np.asarray(fit.problem.guess)))
+def _trusted(fit: Solution) -> tuple[Array, Float[np.ndarray, "r s s"]]:
+    """Initial states of a fit and their covariances, the parameters held, but for runs' deviations.
+
+    The filter is to show how well those are predicted: they have their priors.
+    """
+    layout, spread = fit.vehicle.layout, np.asarray(fit.problem.start_std)
+    fitted = np.array([name not in layout.deviations for name in layout.states])
+    states = slice(len(layout.free), len(layout.free) + len(spread))
+    information = fit.model.products[:, states, states] * np.outer(fitted, fitted) + np.eye(len(spread))
+    start = jax.device_put(np.where(fitted, np.asarray(fit.start), np.asarray(fit.problem.guess)))
+    return start, np.linalg.inv(information) * np.outer(spread, spread)
 
 
 @quietly

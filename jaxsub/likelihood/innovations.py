@@ -14,9 +14,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.scipy.linalg import cho_solve
+from jax.scipy.linalg import block_diag, cho_solve
 from jaxtyping import Array, Float
 
+from ..arrays import Values
 from ..effects import AbstractSensor
 from ..programs import compiled
 from ..recording.runs import Runs
@@ -59,14 +60,19 @@ def filter_runs(
     disturbance: Disturbance,
     start: Float[Array, "r s"],
     start_std: Float[Array, " s"],
+    begin: Float[Values, "r s s"] | None = None,
 ) -> FilteredRuns:
     """`vehicle` filtered along `runs`, from initial states of mean `start` (R, s), standard deviation `start_std` (s,).
 
     Both are SI. `sigma` (c,) is the noise of the channels, SI, in whose units the columns are, and `disturbance` that
-    of the forces.
+    of the forces. `begin` (R, s, s) are covariances by which the path is filtered, where the initial states are known
+    better than the linear model along it assumes: from a velocity that nothing measures and that may be anything, the
+    first samples' noise would lead far from the motion, where no linearisation holds.
     """
+    if begin is None:
+        begin = np.broadcast_to(np.diag(np.asarray(start_std) ** 2), (*start.shape, start.shape[1]))
 
-    own = lambda some: (vehicle, runs.share(some), sigma, disturbance, share_of(start, some), start_std)
+    own = lambda some: (vehicle, runs.share(some), sigma, disturbance, *share_of((start, begin), some), start_std)
     parts = by_share(_filtered_share, own, *runs.times.shape)
     own = [(p.expected, p.filtered, p.force, p.system.by_run, p.residual, p.theta) for p in parts]
     expected, filtered, force, system, residual, theta = joined(own, len(start))
@@ -77,10 +83,16 @@ def filter_runs(
 
 
 def _filtered_share(
-    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, start_std: Array
+    vehicle: AbstractVehicle,
+    runs: Runs,
+    sigma: Array,
+    disturbance: Disturbance,
+    start: Array,
+    begin: Values,
+    start_std: Array,
 ) -> FilteredRuns:
     """`filter_runs` of a share of the runs, at once."""
-    expected, filtered, force, push = _path(vehicle, runs, sigma, disturbance, start, start_std)
+    expected, filtered, force, push = _path(vehicle, runs, sigma, disturbance, start, begin)
     by = jacobians(vehicle, runs, filtered, expected, push)
     system, residual, theta, whole = _columns(vehicle.turning, runs, sigma, start_std, expected, filtered, push, by)
     # waited for, so that no more shares than cores are in memory
@@ -113,7 +125,7 @@ def _columns(
 
 @compiled
 def _path(
-    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, start_std: Array
+    vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, begin: Values
 ) -> tuple[Float[Array, "r k s"], Float[Array, "r k s"], Float[Array, "r k n"], Float[Array, "r k1 2 n"]]:
     """Expected and filtered states, filtered forces, and the force at both ends of each interval."""
     vehicle, outputs = _prompt(vehicle, runs)
@@ -151,16 +163,16 @@ def _path(
         m, P = correct(*carry, seen)
         return predict(m, P, *moving), (carry[0], m)
 
-    def run(begin: Array, *samples: Array) -> tuple[Array, Array]:
+    def run(start: Array, begin: Array, *samples: Array) -> tuple[Array, Array]:
         seen, moving = samples[:4], samples[4:]
         # an interval after the last sample, so that one loop serves all; it leads nowhere
         moving = tuple(jnp.concatenate([a, a[-1:]]) for a in moving)
-        m = jnp.concatenate([begin, jnp.zeros(n)])
-        P = jnp.diag(jnp.concatenate([start_std, disturbance.force]) ** 2)
+        m = jnp.concatenate([start, jnp.zeros(n)])
+        P = block_diag(begin, jnp.diag(disturbance.force**2))
         return jax.lax.scan(advance, (m, P), (seen, moving))[1]
 
     seen = (runs.times, runs.signals, outputs, runs.mask)
-    expected, filtered = jax.vmap(run)(start, *seen, nodes, runs.step_of, runs.live)
+    expected, filtered = jax.vmap(run)(start, jnp.asarray(begin), *seen, nodes, runs.step_of, runs.live)
     force = filtered[..., s:]
     kept = jnp.exp(-runs.steps[runs.step_of][..., None] / disturbance.time) * force[:, :-1]
     return expected[..., :s], filtered[..., :s], force, jnp.stack([force[:, :-1], kept], axis=2)
