@@ -72,10 +72,13 @@ def assessed(
     return assess_residuals(tuple(columns), np.where(mask, whitened, 0.0), mask)
 
 
-def expected_errors(view: View, scale: Float[np.ndarray, " c"]) -> dict[str, float]:
+def expected_errors(
+    view: View, scale: Float[np.ndarray, " c"], quality: Sequence[ChannelQuality]
+) -> dict[str, float]:
     """By channel the rms that noise and a view's disturbance leave in a simulation, its initial states fitted.
 
-    It is over the noise, which is `scale` in SI.
+    It is over `scale`, SI. The white part of the residuals, by the `quality` of the channels, is noise too where it is
+    more than that, as of a sensor with outliers or a σ that is stated too small.
 
     A force counts that changes within a block of a run (`BLOCKS`): what is slower is no more random in a run than
     missing physics is.
@@ -88,7 +91,8 @@ def expected_errors(view: View, scale: Float[np.ndarray, " c"]) -> dict[str, flo
     errors = open_loop_errors(dataclasses.replace(disturbance, force=random), system, draws)
     samples = np.maximum(np.sum(measured, axis=(0, 1)), 1)
     squares = np.sum(np.mean(errors**2, axis=-1), axis=(0, 1)) / samples
-    rms = np.sqrt(1.0 + squares * (np.asarray(view.sigma) / scale) ** 2)
+    white = np.maximum(1.0, [one.record_sigma for one in quality] / scale)
+    rms = np.sqrt(white**2 + squares * (np.asarray(view.sigma) / scale) ** 2)
     return dict(zip(view.vehicle.layout.channels, rms.tolist(), strict=True))
 
 

@@ -69,7 +69,7 @@ def shown_on(
     over = lambda values: {c: value * float(r) for (c, value), r in zip(values.items(), sigma / scale, strict=True)}
     low = [over({channel: one.low for channel, one in left.items()}) for left in remains.values()]
     assessment = assessed(after.error, test, layout.measured, scale)
-    expected = expected_errors(models[-1].view, scale) if assessment.oversized else {}
+    expected = expected_errors(models[-1].view, scale, quality) if assessment.oversized else {}
     explained = compared(over(before.rms), over(after.rms), low[0], expected, assessment)
     gain = test_gain(before, after, pieces) if len(models) > 1 else None
     return Shown(before, after, remains, explained, low[-1], assessment, gain)

@@ -59,8 +59,9 @@ def answers(
 
     After each acceptance all candidates are examined again from the new model: far from the truth, the linearisation
     shows only the largest effect. Coefficients of the baseline that it replaces are left out. Where the baseline cannot
-    be simulated, and where all proposals are rejected, stepwise selection by innovations is tried, once. Where the
-    mismatch is significant still, the remaining candidates are proposed.
+    be simulated, and where all proposals are rejected, stepwise selection by innovations is tried, once. What it
+    accepts is the last answer where simulation follows in parts of runs alone. Where the mismatch is significant still,
+    the remaining candidates are proposed.
     """
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
@@ -68,8 +69,12 @@ def answers(
     searched = not baseline.fit.converged
     by_innovations = stepwise_by_innovations(fitter, baseline, vocabulary) if searched else None
     if by_innovations is not None:
-        return *by_innovations, None
-    if begin:
+        best, judged = by_innovations
+        if best.pieces > 1:
+            return best, judged, None
+        yield best, judged
+        found = examine(best.view, vocabulary, fitter.progress)
+    elif begin:
         best, judged = warm_started(fitter, baseline, found, begin)
         if judged.named:
             best, judged = with_replacement(fitter.progress, best, judged)
@@ -92,9 +97,14 @@ def answers(
             best, judged = with_replacement(fitter.progress, best, judged)
         if chosen and not current.named:
             by_innovations = None if searched else stepwise_by_innovations(fitter, best, vocabulary)
-            if by_innovations is not None:
-                return by_innovations[0], combined(judged, by_innovations[1]), None
             searched = True
+            if by_innovations is not None:
+                best, judged = by_innovations[0], combined(judged, by_innovations[1])
+                if best.pieces > 1:
+                    return best, judged, None
+                yield best, judged
+                found = examine(best.view, vocabulary, fitter.progress)
+                continue
             if current.verdict == "unknown" and refusals < settings.ALTERNATIVES:
                 refusals, after = refusals + 1, weighed(found.view, found.selector, fitter.progress)
         if after is None and not current.named:

@@ -13,6 +13,7 @@ from rigs import driven, oscillator
 from jaxsub.discrepancy import innovation_search, view
 from jaxsub.discrepancy.columns import columns_of
 from jaxsub.discrepancy.consistency import expected_errors
+from jaxsub.discrepancy.diagnosis import ChannelQuality
 from jaxsub.discrepancy.evidence import Evidence, evidence_of
 from jaxsub.discrepancy.view import look
 from jaxsub.effects.hull import HullAsymmetry
@@ -112,11 +113,17 @@ def test_what_is_random_is_as_large_as_many_simulations_are_off():
     off = off - taken
     stated = np.array([0.01, 0.02])
     rms = np.sqrt(1.0 + np.mean((off / stated) ** 2, axis=(0, 1)))
-    np.testing.assert_allclose([*expected_errors(pushed(slow), stated).values()], rms, rtol=0.1)
-    assert [*expected_errors(pushed(30.0), stated).values()] == [1.0, 1.0]
+    channels = zip(seen.vehicle.layout.channels, stated, strict=True)
+    quality = [ChannelQuality(channel, "", 600, 0.0, sigma, False, sigma) for channel, sigma in channels]
+    np.testing.assert_allclose([*expected_errors(pushed(slow), stated, quality).values()], rms, rtol=0.1)
+    assert [*expected_errors(pushed(30.0), stated, quality).values()] == [1.0, 1.0]
+    # residuals with three times the stated noise, and white
+    noisier = [dataclasses.replace(one, record_sigma=3.0 * one.sigma) for one in quality]
+    assert [*expected_errors(pushed(30.0), stated, noisier).values()] == pytest.approx([3.0, 3.0])
     # of half the noise random forces leave twice as much
+    quiet = [dataclasses.replace(one, record_sigma=0.5 * one.sigma) for one in quality]
     halved = np.sqrt(1.0 + 4.0 * (rms**2 - 1.0))
-    np.testing.assert_allclose([*expected_errors(pushed(slow), 0.5 * stated).values()], halved, rtol=0.1)
+    np.testing.assert_allclose([*expected_errors(pushed(slow), 0.5 * stated, quiet).values()], halved, rtol=0.1)
 
 
 def test_searches_that_agree_are_one():
