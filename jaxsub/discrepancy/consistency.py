@@ -72,9 +72,7 @@ def assessed(
     return assess_residuals(tuple(columns), np.where(mask, whitened, 0.0), mask)
 
 
-def expected_errors(
-    view: View, scale: Float[np.ndarray, " c"], quality: Sequence[ChannelQuality]
-) -> dict[str, float]:
+def expected_errors(view: View, scale: Float[np.ndarray, " c"], quality: Sequence[ChannelQuality]) -> dict[str, float]:
     """By channel the rms that noise and a view's disturbance leave in a simulation, its initial states fitted.
 
     It is over `scale`, SI. The white part of the residuals, by the `quality` of the channels, is noise too where it is

@@ -6,17 +6,18 @@ likelihood.
 """
 
 import dataclasses
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 
 import jax
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..arrays import quietly
 from ..estimate import Problem, by_cost, estimate_disturbance
-from ..likelihood import Columns, Disturbance, FilteredRuns, filter_runs
+from ..likelihood import Columns, Disturbance, FilteredRuns, filter_runs, smoothed
 from ..vehicle import AbstractVehicle
+from ..vehicle.layout import Layout
 from . import settings
 
 # dampings of a scoring step, of a column's squares, and shares of a change of the disturbance, tried in this order
@@ -161,6 +162,27 @@ class InnovationSearch:
             iterate = better
         return iterate
 
+    def from_smoothed(self, iterate: Iterate, ended: Callable[["InnovationSearch", Iterate], Iterate]) -> Iterate:
+        """Where the search `ended` along the path from where all samples say that the runs began, as sure as they say.
+
+        From its prior alone a velocity that nothing measures is led far off by the first samples' noise. The iterate
+        itself where the filter diverges from there.
+        """
+        search = self._begun(iterate)
+        found = ended(search, search.evaluate(iterate.vehicle, iterate.disturbance))
+        return found if np.isfinite(found.cost) else iterate
+
+    @quietly
+    def _begun(self, iterate: Iterate) -> "InnovationSearch":
+        problem = self.problem
+        weights = np.append(1.0, -np.linalg.solve(iterate.gram[1:, 1:], iterate.gram[1:, 0]))
+        left = jax.tree.map(lambda column: (column @ weights)[..., None], iterate.base)
+        found = smoothed(iterate.disturbance, iterate.followed.system, left)
+        fitted, prior = fitted_states(problem.vehicle.layout), np.diag(np.asarray(problem.start_std) ** 2)
+        start = np.asarray(self.start) + np.where(fitted, np.asarray(found.start), 0.0)
+        begin = np.where(np.outer(fitted, fitted), np.asarray(found.covariance), prior)
+        return dataclasses.replace(self, start=jax.device_put(start), begin=begin)
+
     def _scored(self, iterate: Iterate) -> Iterate:
         """Scoring steps until they gain little."""
         for _ in range(_STEPS):
@@ -168,6 +190,11 @@ class InnovationSearch:
             if not before.likelihood_cost - iterate.likelihood_cost >= _LEAST_GAIN:
                 break
         return iterate
+
+
+def fitted_states(layout: Layout) -> Bool[np.ndarray, " s"]:
+    """Which initial states are known by a fit: not runs' deviations, whose predictions a filter is to show."""
+    return np.array([name not in layout.deviations for name in layout.states])
 
 
 def _disturbances(iterate: Iterate) -> Iterator[Disturbance]:

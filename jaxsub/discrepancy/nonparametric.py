@@ -92,7 +92,7 @@ def pattern(view: View, chosen: Evidence, columns: list[int], under: Sequence[Pr
         return None
     left = chosen.left(columns, under[-1])
     system = chosen.within(columns, under[-1]).view.followed.system
-    mean, _ = smoothed(under[-1].disturbance, system, left)
+    mean = smoothed(under[-1].disturbance, system, left).force
     picked = chosen.columns.picked([c for c in columns if c < len(chosen.columns)])
     varying = [c - len(chosen.columns) for c in columns if c >= len(chosen.columns)]
     beside = lambda force: picked + columns_of(view, basis_forces(view, force, FINE))

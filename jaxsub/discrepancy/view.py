@@ -30,7 +30,7 @@ from ..recording.runs import Runs
 from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle, numbers_that_may_vary, quantities_of
 from . import settings
-from .innovation_search import InnovationSearch, Iterate, distinct, with_wide_priors
+from .innovation_search import InnovationSearch, Iterate, distinct, fitted_states, with_wide_priors
 from .tones import tones
 from .whiteness import record_sigma
 
@@ -122,7 +122,8 @@ def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVe
     the file: a fit without the missing physics may be in an optimum that nothing leads out of. Its initial states are
     not trusted either, and the filter begins at their prior. Without a disturbance given, the search is then a
     multi-start one, whose better half goes on after each alternation: the misfit is first attributed to forces, or to
-    sensors, since forces that follow a faulty sensor bias all others.
+    sensors, since forces that follow a faulty sensor bias all others. It ends along the path from the initial states
+    that all samples then show.
 
     Parameters of the file have a wide prior. Without a velocity log, say, the recordings hardly identify some, and
     values a hundred times too large could absorb an actuator's force.
@@ -144,18 +145,21 @@ def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVe
     while len(iterates) > 1:
         iterates = distinct(search.alternated(iterate) for iterate in iterates)
         iterates = iterates[: max(1, len(iterates) // 2)]
-    return _view(search, search.converged(iterates[0]))
+    found = search.converged(iterates[0])
+    return _view(search, search.from_smoothed(found, InnovationSearch.converged) if much else found)
 
 
 def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: Iterable[Disturbance]) -> View:
     """The view of a vehicle, its free parameters estimated by innovations from where they are.
 
     One search, from the best of some disturbances: most parameters come from innovations already. It goes on until it
-    converges, since the first steps are far from linear.
+    converges, since the first steps are far from linear, and then along the path from the initial states that all
+    samples show.
     """
     problem = with_wide_priors(Problem.of(vehicle, runs, sigma))
     search = InnovationSearch(problem, problem.guess)
-    return _view(search, search.maximised(by_cost(search.evaluate(vehicle, one) for one in disturbances)[0]))
+    found = search.maximised(by_cost(search.evaluate(vehicle, one) for one in disturbances)[0])
+    return _view(search, search.from_smoothed(found, InnovationSearch.maximised))
 
 
 @quietly
@@ -165,7 +169,7 @@ def _trusted(fit: Solution) -> tuple[Array, Float[np.ndarray, "r s s"]]:
     The filter is to show how well those are predicted: they have their priors.
     """
     layout, spread = fit.vehicle.layout, np.asarray(fit.problem.start_std)
-    fitted = np.array([name not in layout.deviations for name in layout.states])
+    fitted = fitted_states(layout)
     states = slice(len(layout.free), len(layout.free) + len(spread))
     information = fit.model.products[:, states, states] * np.outer(fitted, fitted) + np.eye(len(spread))
     start = jax.device_put(np.where(fitted, np.asarray(fit.start), np.asarray(fit.problem.guess)))
@@ -230,8 +234,8 @@ def _white(fit: Solution) -> np.ndarray:
 
 def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndarray, "r k n"]]:
     """The smoothed disturbance force (N, N m), which the model lacks, and its standard deviation."""
-    mean, deviation = smoothed(view.disturbance, view.followed.system, _left(view))
-    return np.asarray(mean), np.asarray(deviation)
+    found = smoothed(view.disturbance, view.followed.system, _left(view))
+    return np.asarray(found.force), np.asarray(found.deviation)
 
 
 def _left(view: View) -> Columns:

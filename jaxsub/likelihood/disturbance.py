@@ -355,14 +355,26 @@ def _correlated(
     return jax.vmap(run)(jnp.exp(-intervals[..., None] / time), values)
 
 
-@compiled
-def smoothed(
-    disturbance: Disturbance, system: System, column: Columns
-) -> tuple[Float[Array, "r k n"], Float[Array, "r k n"]]:
-    """The disturbance force (N, N m) of one `column`, given all of its samples, and its standard deviation; (R, K, n).
+class Smoothed(NamedTuple):
+    """What all samples of a column say of R runs.
 
-    The force is of `disturbance` on `system`. The adjoint form of the smoother, which inverts no covariance of the
-    state. Source: Bierman (1973), Automatica 9.
+    **Fields**
+
+    - `force`, `deviation`: (R, K, n) the disturbance force (N, N m) and its standard deviation.
+    - `start`, `covariance`: (R, s) and (R, s, s) the initial state, less that from which it was linearised, SI.
+    """
+
+    force: Float[Array, "r k n"]
+    deviation: Float[Array, "r k n"]
+    start: Float[Array, "r s"]
+    covariance: Float[Array, "r s s"]
+
+
+@compiled
+def smoothed(disturbance: Disturbance, system: System, column: Columns) -> Smoothed:
+    """The force of a `disturbance` on `system` that one `column` shows, given all of its samples, and initial states.
+
+    The adjoint form of the smoother, which inverts no covariance of the state. Source: Bierman (1973), Automatica 9.
     """
     F, B = transition(disturbance, system)
     s, n = system.C.shape[-1], len(disturbance.force)
@@ -387,11 +399,12 @@ def smoothed(
         mean, variance = m - P @ lever, jnp.diag(P - P @ weight @ P)
         return (lever, weight), (mean[s:], jnp.sqrt(jnp.maximum(variance[s:], 0.0)))
 
-    def run(*samples: Values) -> tuple[Array, Array]:
+    def run(*samples: Values) -> Smoothed:
         begin = jnp.diag(jnp.concatenate([system.start_std, disturbance.force]) ** 2)
         _, kept = jax.lax.scan(forth, (jnp.zeros(s + n), begin), samples)
         nothing = jnp.zeros(s + n), jnp.zeros((s + n, s + n))
-        return jax.lax.scan(back, nothing, kept, reverse=True)[1]
+        (lever, weight), force = jax.lax.scan(back, nothing, kept, reverse=True)
+        return Smoothed(*force, (-begin @ lever)[:s], (begin - begin @ weight @ begin)[:s, :s])
 
     assert column.forcing is not None
     return jax.vmap(run)(beyond(F), beyond(B), C, noise, column.shown, beyond(column.forcing))
