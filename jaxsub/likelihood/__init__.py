@@ -12,7 +12,6 @@ from .disturbance import (
     padded_width,
     part_products,
     restricted,
-    smoothed,
     total_products,
     whitened,
 )
@@ -23,6 +22,7 @@ from .open_loop import open_loop_errors
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
 from .run_shares import by_share, joined, share_of, shares
 from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise_runs, propagate
+from .smoother import smoothed
 
 __all__ = [
     "Averages",

@@ -6,7 +6,7 @@ import pytest
 from experiments.concealed_physics.simulate import Drive, outputs
 from experiments.own_vehicles import plan, vehicles, work
 from experiments.own_vehicles.generate import generate
-from jaxsub.effects import VOCABULARY
+from jaxsub.effects import vocabulary
 from jaxsub.vehicle import read_vehicle
 
 CASES = {case.name: case for case in plan.CASES}
@@ -20,7 +20,7 @@ def drive(trial, vehicle, samples=60):
 
 def test_every_case_has_a_name_of_its_own_and_conceals_what_the_vocabulary_names():
     assert len(CASES) == len(plan.CASES)
-    names = {kind.name for kind in VOCABULARY}
+    names = {kind.name for kind in vocabulary()}
     concealed = [case.truth[0].name for case in plan.CASES if case.truth]
     assert set(concealed) <= names
     assert all(case.vehicle in vehicles.TRIALS for case in plan.CASES)
