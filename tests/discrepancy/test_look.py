@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import scipy.signal
+import scipy.stats
 from diagnosis_cases import recorded, wrong
 from rigs import driven, oscillator
 
@@ -15,11 +16,14 @@ from jaxsub.discrepancy.columns import columns_of
 from jaxsub.discrepancy.consistency import expected_errors
 from jaxsub.discrepancy.diagnosis import ChannelQuality
 from jaxsub.discrepancy.evidence import Evidence, evidence_of
+from jaxsub.discrepancy.examine import listed
 from jaxsub.discrepancy.view import look
+from jaxsub.effects import ActuatorLag, CubicDamping, CubicStiffness, QuadraticDamping, SensorDelay
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.estimate import batch, fit
 from jaxsub.likelihood import Disturbance, whitened
 from jaxsub.likelihood.whiteness import portmanteau
+from jaxsub.parameters import number
 from jaxsub.recording import Recording
 from jaxsub.simulation import prbs, synthetic
 
@@ -124,6 +128,24 @@ def test_what_is_random_is_as_large_as_many_simulations_are_off():
     quiet = [dataclasses.replace(one, record_sigma=0.5 * one.sigma) for one in quality]
     halved = np.sqrt(1.0 + 4.0 * (rms**2 - 1.0))
     np.testing.assert_allclose([*expected_errors(pushed(slow), 0.5 * stated, quiet).values()], halved, rtol=0.1)
+
+
+def test_scores_of_clean_runs_are_uniform_where_nothing_measures_a_rate():
+    """Claim: smallest p-values of six clean recordings are uniform (Kolmogorov and Smirnov), none below 0.01.
+
+    The rate at the start may be anything a priori, and its drag is far from linear: a path that the first samples'
+    noise leads astray has scores that no clean recording has.
+    """
+    coefficients, outputs = {"D_x": 0.1, "K_x": 1.0, "B_x_drive": 1.0}, {"x": {"sigma": 0.01}}
+    rig = oscillator(coefficients=coefficients, outputs=outputs).with_effect(QuadraticDamping("x", number(-20.0)))
+    p_values = []
+    for seed in range(6):
+        inputs = [driven(rig, 0.2 * np.arange(300), seed=10 * seed + run) for run in range(2)]
+        seen = look(fit(rig, batch(rig, synthetic(rig, inputs, seed=seed)).padded()), near=rig)
+        selector = listed(seen, (CubicDamping, CubicStiffness, SensorDelay, ActuatorLag))
+        p_values.append(selector.smallest_p_value(selector.scan([])))
+    assert min(p_values) > 0.01
+    assert scipy.stats.kstest(p_values, "uniform").pvalue > 0.01
 
 
 def test_searches_that_agree_are_one():
