@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import block_diag
 
+from ..arrays import quietly
 from ..likelihood import Disturbance
 from .run_effect import RunEffect
 from .view import Parts
@@ -21,6 +22,7 @@ class Gains(NamedTuple):
     amplitudes: list[np.ndarray]
 
 
+@quietly
 def integrated(gram: Float[np.ndarray, "q q"]) -> float:
     r"""$\ln\int e^{-\frac12 |r + Ja|^2}da$, but for $2\pi$, by the products of [r, J], priors of a included."""
     squares = gram[0, 0] - gram[1:, 0] @ np.linalg.solve(gram[1:, 1:], gram[1:, 0])
