@@ -80,7 +80,7 @@ def _driven(
         fixed = np.stack([commands(case.body, run, samples, rng) for run in range(RUNS)])
         steer = lambda truths, sizes: fixed
     calm = np.zeros((RUNS, samples, len(vehicle.layout.equations)))
-    drive = lambda held: Drive(*(jnp.asarray(a) for a in (starts, held[:, :-1], calm)))
+    drive = lambda held: Drive(jnp.asarray(starts), jnp.asarray(held[:, :-1]), jnp.asarray(calm))
     held, found = steer((), []), []
     for _ in range(1 + case.way.autopilot if truths else 0):
         seen = Unabsorbed(vehicle, drive(held).of(slice(-1)), sigma)

@@ -32,7 +32,8 @@ class Drive(NamedTuple):
 
     def of(self, runs: slice) -> "Drive":
         """Of some of the runs."""
-        return Drive(*(None if part is None else part[runs] for part in self[:-1]), self.interval)
+        prescribed = None if self.prescribed is None else self.prescribed[runs]
+        return Drive(self.start[runs], self.commands[runs], self.push[runs], prescribed, self.interval)
 
 
 @eqx.filter_jit

@@ -33,7 +33,8 @@ def generate(case: Case, folder: Path) -> dict:
     moved = np.stack([trial.prescribed(commands) for commands in held])
     calm = np.zeros((trial.runs, trial.samples, len(known.layout.equations)))
     truths, sizes = ((case.truth[0],), jnp.asarray([case.truth[1]])) if case.truth else ((), jnp.zeros(0))
-    drive = Drive(*(jnp.asarray(a) for a in (starts, held[:, :-1], calm, moved)), trial.interval)
+    arrays = map(jnp.asarray, (starts, held[:, :-1], calm, moved))
+    drive = Drive(*arrays, interval=trial.interval)
     alone = [outputs(vehicle, truths, sizes, drive.of(slice(run, run + 1))) for run, vehicle in enumerate(true)]
     ideal, states = (np.concatenate(parts) for parts in zip(*alone, strict=True))
     if not np.all(np.isfinite(ideal)):

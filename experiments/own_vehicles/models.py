@@ -3,7 +3,6 @@
 from typing import ClassVar
 
 import jax.numpy as jnp
-from jaxtyping import Array
 
 from jaxsub.vehicle import Model
 
@@ -12,10 +11,10 @@ class Motor(Model):
     """A brushed motor: its current (A) and its speed (rad/s)."""
 
     states, inputs, outputs = ("current", "speed"), ("voltage",), {"current": 0.02, "speed": 0.2}
-    R: Array
-    L: Array
-    k: Array
-    J: Array
+    R: float
+    L: float
+    k: float
+    J: float
 
     def rates(self, state, inputs, time):
         """Of the current (A/s) and of the speed (rad/s²)."""
@@ -31,8 +30,8 @@ class Tank(Model):
 
     states, inputs, outputs = ("level",), ("pump",), {"level": 0.002}
     parameters: ClassVar = {"area": {"fixed": True}}
-    area: Array
-    hole: Array
+    area: float
+    hole: float
 
     def rates(self, state, inputs, time):
         """Of the level, m/s."""
@@ -44,8 +43,8 @@ class DoublePendulum(Model):
     """Two equal rods without mass, a bob at the end of each, and a motor at the hinge."""
 
     states, inputs, outputs = ("one", "two", "one_rate", "two_rate"), ("torque",), {"one": 0.01, "two": 0.01}
-    m: Array
-    b: Array
+    m: float
+    b: float
     length: float = 0.4
 
     def rates(self, state, inputs, time):

@@ -165,7 +165,7 @@ def prescribed_columns(view: View, effects: Sequence[AbstractEffect]) -> EffectC
 @quietly
 def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[Part]]:
     """Each column of each effect, a force or a change of the channels."""
-    tried, before = [], [on_prescribed(view.vehicle, effect) for effect in effects]
+    tried, before = [], [on_prescribed(effect, view.vehicle) for effect in effects]
     for effect, apart in zip(effects, before, strict=True):
         names = amplitudes(effect)
         if apart:
@@ -294,7 +294,7 @@ def plausible(view: View, effect: AbstractEffect) -> bool:
             abs(numbers(effect)[name]) <= effect.reach * view.vehicle.layout.length for name in amplitudes(effect)
         )
 
-    if on_prescribed(view.vehicle, effect):
+    if on_prescribed(effect, view.vehicle):
         change, motion = prescribed_change(view, effect)
         return float(np.ptp(change)) <= float(np.ptp(motion))
 

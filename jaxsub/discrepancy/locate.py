@@ -100,8 +100,8 @@ def effect_shares(view: View, effects: Sequence[AbstractEffect], disturbance: Di
     equations, channels = view.vehicle.layout.equations, view.vehicle.layout.channels
     varying = [effect for effect in effects if isinstance(effect, RunVariation)]
     effects = [effect for effect in effects if not isinstance(effect, RunVariation)]
-    before = [effect for effect in effects if on_prescribed(view.vehicle, effect)]
-    effects = [effect for effect in effects if not on_prescribed(view.vehicle, effect)]
+    before = [effect for effect in effects if on_prescribed(effect, view.vehicle)]
+    effects = [effect for effect in effects if not on_prescribed(effect, view.vehicle)]
     for effect, whole in zip(effects, differences(view, effects), strict=True):
         if isinstance(effect, AbstractInstrument):
             shown += [(f"sensor:{c}", whole * (np.asarray(channels) == c)) for c in effect.channels]

@@ -16,7 +16,7 @@ from ..vehicle import AbstractVehicle
 from .view import View
 
 
-def on_prescribed(vehicle: AbstractVehicle, effect: AbstractEffect) -> TypeGuard[AbstractSensor]:
+def on_prescribed(effect: AbstractEffect, vehicle: AbstractVehicle) -> TypeGuard[AbstractSensor]:
     """Whether an effect is of a sensor by whose recording the `vehicle` moves."""
     return isinstance(effect, AbstractSensor) and not vehicle.shows(effect)
 

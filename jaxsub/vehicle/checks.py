@@ -16,6 +16,7 @@ from ..effects import (
     AbstractFlow,
     AbstractForce,
     AbstractInstrument,
+    AbstractSensor,
     Derivative,
     Motion,
     options,
@@ -167,19 +168,20 @@ def check_effects(vehicle: AbstractVehicle, where: str) -> None:
         if isinstance(effect, AbstractActuator) and effect.actuator not in dict(layout.inputs):
             hint = nearest(effect.actuator, [n for n, _ in layout.inputs]) or "an actuator of [inputs]"
             raise InputError(place, f"no actuator {effect.actuator}", f"use {hint}")
-        for channel in effect.channels if isinstance(effect, AbstractInstrument) else ():
-            _check_channel(effect, channel, layout, place)
+        if isinstance(effect, AbstractInstrument):
+            _check_channels(effect, layout, place)
 
 
-def _check_channel(effect: AbstractInstrument, channel: str, layout: Layout, place: str) -> None:
+def _check_channels(effect: AbstractInstrument, layout: Layout, place: str) -> None:
     prescribed = [name for name, _ in layout.prescribed]
-    if channel in layout.channels or (channel in prescribed and getattr(effect, "of_prescribed", False)):
-        return
-    if channel in prescribed:
-        remedy = "delete it, or measure that motion under [outputs]"
-        raise InputError(place, f"cannot be on {channel}, which is prescribed", remedy)
-    hint = nearest(channel, [*layout.channels, *prescribed]) or "a channel of [outputs]"
-    raise InputError(place, f"no channel {channel}", f"use {hint}")
+    may = [*layout.channels, *(prescribed if isinstance(effect, AbstractSensor) and effect.of_prescribed else ())]
+    for channel in effect.channels:
+        if channel in may:
+            continue
+        if channel in prescribed:
+            remedy = "delete it, or measure that motion under [outputs]"
+            raise InputError(place, f"cannot be on {channel}, which is prescribed", remedy)
+        raise InputError(place, f"no channel {channel}", f"use {nearest(channel, may) or 'a channel of [outputs]'}")
 
 
 def check_variation(vehicle: AbstractVehicle, where: str) -> None:
