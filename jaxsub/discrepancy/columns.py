@@ -296,7 +296,8 @@ def plausible(view: View, effect: AbstractEffect) -> bool:
 
     if on_prescribed(effect, view.vehicle):
         change, motion = prescribed_change(view, effect)
-        return float(np.ptp(change)) <= float(np.ptp(motion))
+        # its motion is the vehicle's: an attitude that is off by more than it varies is not what was steered by
+        return float(np.max(np.abs(change))) <= float(np.ptp(motion))
 
     def shown(channel: str) -> float:
         measured = view.measured(channel)
