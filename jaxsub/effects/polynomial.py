@@ -32,12 +32,15 @@ class PolynomialTerm(AbstractForce):
 
     @classmethod
     def candidates(cls, facts: Facts) -> "Sequence[PolynomialTerm]":
-        """In each equation of a user's own model: the constant, each state, and each product of two signals."""
+        """In each equation of a user's own model: the constant, its own state, and each product of two signals.
+
+        Other states are left out: together their linear terms would stand for any small delay or lag.
+        """
         if facts.kind != "model":
             return []
-        pairs = itertools.combinations_with_replacement((*facts.equations, *facts.actuators), 2)
-        products = [_CONSTANT, *facts.equations, *map("*".join, pairs)]
-        return [cls(equation, product) for equation in facts.equations for product in products]
+        signals = (*facts.equations, *facts.actuators)
+        pairs = ["*".join(pair) for pair in itertools.combinations_with_replacement(signals, 2)]
+        return [cls(equation, product) for equation in facts.equations for product in (_CONSTANT, equation, *pairs)]
 
     @property
     def where(self) -> tuple[str, ...]:

@@ -51,10 +51,10 @@ def test_vehicle_with_the_term_moves_as_equations_that_have_it():
 
 
 def test_models_of_a_user_have_every_term_and_other_vehicles_none():
-    """Claim: of two states and an input, 1 + 2 + 6 terms in each rate."""
+    """Claim: of two states and an input, the constant, the state itself and six products in each rate."""
     of = lambda kind: Facts(kind, ("a", "b"), ("push",), ("a",), (), 0.0, 0.0, {"a": 1.0, "b": 1.0}, 0.1)
     found = candidates(of("model"), (PolynomialTerm,))
-    assert len({effect.label for effect in found}) == 2 * (1 + 2 + 6)
+    assert len({effect.label for effect in found}) == 2 * (1 + 1 + 6)
     assert candidates(of("mechanism"), (PolynomialTerm,)) == []
 
 
