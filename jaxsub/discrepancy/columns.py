@@ -128,7 +128,8 @@ class EffectColumns:
             if not self.parts[i].is_force:
                 onto.shown[..., at, i] = np.where(measured[..., at], value[runs] / sigma[at], 0.0)
             if step is not None:
-                forcing[..., i] = step[runs]
+                # numbers that differ by run may be states after the vehicle's own
+                forcing[:, :, : step.shape[-1], i] = step[runs]
 
 
 def candidate_columns(view: View, candidates: Sequence[AbstractEffect]) -> tuple[EffectColumns, list[list[int]]]:
