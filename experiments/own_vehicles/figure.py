@@ -6,6 +6,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import numpy as np
 
 COLOURS = {"right": "#1f4e79", "ambiguous": "#c9a227", "wrong": "#b5482a"}
 
@@ -20,9 +21,11 @@ def draw(results: dict, path: Path) -> None:
         axis.plot([before, after], [row, row], color=colour, lw=2)
         axis.plot(before, row, "o", mfc="white", mec=colour, label="fitted file" if not row else None)
         axis.plot(after, row, "o", color=colour, label="answer" if not row else None)
-        names = ", ".join(entry["effect"] for entry in line["answer"]["physics"])
+        names = ", ".join(dict.fromkeys(entry["effect"] for entry in line["answer"]["physics"]))
         text = f"{line['answer']['verdict']}{': ' + names if names else ''} ({line['mark']})"
-        axis.annotate(text, (max(before, after), row), (8, 0), textcoords="offset points", va="center", fontsize=8)
+        # a fitted file that diverges has no error
+        far = np.nanmax([before, after])
+        axis.annotate(text, (far, row), (8, 0), textcoords="offset points", va="center", fontsize=8)
     axis.axvline(1.0, color="0.6", lw=1)
     axis.set_yticks(range(len(cases)), [f"{line['vehicle']}:\n{line['concealed']}" for line in cases], fontsize=8)
     axis.set_ylim(max(len(cases), 1) - 0.5, -0.5)
