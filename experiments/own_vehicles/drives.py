@@ -20,13 +20,18 @@ def levels(samples: int, hold: int, largest: float, rng: np.random.Generator) ->
     return found
 
 
+def level_thrusters(ahead: np.ndarray, across: np.ndarray, turn: np.ndarray) -> list[np.ndarray]:
+    """Demands ahead, across and of turning for four thrusters at the corners of an ROV, each turned by 45°."""
+    return [ahead - across - turn, ahead + across + turn, -ahead - across + turn, -ahead + across - turn]
+
+
 def rov(run: int, samples: int, rng: np.random.Generator) -> np.ndarray:
     """Demands ahead, across, down and of turning, given to eight thrusters; each has a little of its own too.
 
     Nobody holds it upright, so they are small enough for its weight to do so.
     """
     ahead, across, turn = (levels(samples, 15, size, rng) for size in (0.15, 0.15, 0.1))
-    level = [ahead - across - turn, ahead + across + turn, -ahead - across + turn, -ahead + across - turn]
+    level = level_thrusters(ahead, across, turn)
     upright = [-levels(samples, 25, 0.2, rng)] * 4
     own = [levels(samples, 10, size, rng) for size in (*[0.04] * 4, *[0.015] * 4)]
     return np.stack([*level, *upright], 1) + np.stack(own, 1)
@@ -71,7 +76,7 @@ def work_class(run: int, samples: int, rng: np.random.Generator) -> np.ndarray:
     """Rotor speeds: four rotors hold an ROV down that is too light, four push it ahead, across and round."""
     ahead, across, turn = (levels(samples, 15, size, rng) for size in (500.0, 400.0, 250.0))
     down = [-480.0 + levels(samples, 25, 80.0, rng)] * 4
-    level = [ahead - across - turn, ahead + across + turn, -ahead - across + turn, -ahead + across - turn]
+    level = level_thrusters(ahead, across, turn)
     own = [levels(samples, 10, 20.0, rng) for _ in range(8)]
     return np.stack([*down, *level], 1) + np.stack(own, 1)
 

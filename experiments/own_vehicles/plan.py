@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from experiments.concealed_physics.truth import Truth
+from experiments.concealed_physics.truths import TRUTHS
 from jaxsub.vehicle import AbstractVehicle
 from jaxsub.vehicle.catalogue import kvlcc2
 
@@ -18,7 +19,6 @@ from .truths import (
     dry,
     off,
     out_of_the_race,
-    shrinking,
     slow,
     stream,
     towed,
@@ -76,7 +76,7 @@ CASES = (
     Case("rexrov-tether", "RexROV", "tether of 30 mm", (towed(), 18.504)),
     Case("seaglider-drift", "Seaglider", "buoyancy falls from dive to dive, by 0.3 N in all",
          (drifting("buoyancy"), 0.1), drifts={"buoyancy": (0.0, -0.05, -0.12, -0.15, -0.22, -0.3)}),
-    Case("slocum-shrinks", "Slocum", "hull shrinks under pressure", (shrinking(), 1e-9)),
+    Case("slocum-shrinks", "Slocum", "hull shrinks under pressure", (TRUTHS["nps/hull-compressibility[depth]"], 1e-9)),
     Case("motor-friction", "Motor", "dry friction", (dry("speed"), 10.0)),
     Case("tank-lag", "Tank", "pump lags by 30 s", (slow("pump"), 30.0)),
     Case("pendulum-delay", "Double pendulum", "encoder of the lower rod 0.05 s late", (delayed("two"), 0.05)),

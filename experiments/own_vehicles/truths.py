@@ -9,7 +9,7 @@ import numpy as np
 from experiments.concealed_physics.actuators import lag
 from experiments.concealed_physics.sensors import late
 from experiments.concealed_physics.surroundings import over_ground, tether
-from experiments.concealed_physics.truth import GRAVITY, WATER, Truth
+from experiments.concealed_physics.truth import Truth
 from jaxsub.parameters import Parameter
 from jaxsub.vehicle import AbstractVehicle, SubmergedBody
 
@@ -53,17 +53,6 @@ def towed() -> Truth:
     """A line from the surface, whose drag is that of its length, N s²/m² a metre."""
     where = ("surge", "sway", "heave")
     return Truth("tether-drag", "to the surface", "environment", where, math.inf, force=tether)
-
-
-def shrinking() -> Truth:
-    """A hull that displaces less the deeper it is, by parts a pascal."""
-
-    def force(a, m):
-        lost = m.motion.buoyancy * a * WATER * GRAVITY * m.positions["z"]
-        theta = m.positions["theta"]
-        return {"surge": -lost * jnp.sin(theta), "heave": lost * jnp.cos(theta)}
-
-    return Truth("hull-compressibility", "depth", "hydrostatics", ("surge", "heave"), math.inf, force=force)
 
 
 def dry(equation: str) -> Truth:

@@ -166,21 +166,24 @@ def prescribed_columns(view: View, effects: Sequence[AbstractEffect]) -> EffectC
 @quietly
 def _effect_columns(view: View, effects: Sequence[AbstractEffect]) -> list[list[Part]]:
     """Each column of each effect, a force or a change of the channels."""
-    tried, before = [], [on_prescribed(effect, view.vehicle) for effect in effects]
-    for effect, apart in zip(effects, before, strict=True):
-        names = amplitudes(effect)
-        if apart:
+    before = [effect for effect in effects if on_prescribed(effect, view.vehicle)]
+    slopes_before = iter(prescribed_slopes(view, before))
+    tried = []
+    for effect in effects:
+        if on_prescribed(effect, view.vehicle):
             tried.append([])
             continue
+        names = amplitudes(effect)
         more = {field: value * (1.0 + _NUDGE) for field, value in numbers(effect).items()}
         small = [with_numbers(effect, {name: _SMALL * (name == own) for name in names}) for own in names]
         tried.append(small or [effect, with_numbers(effect, more)])
     # one after the other: only where they act are they kept
     made = _differences(view, [one for own in tried for one in own])
-    columns, slopes_before = [], iter(prescribed_slopes(view, list(itertools.compress(effects, before))))
+    columns = []
     for effect, own in zip(effects, tried, strict=True):
         if not own:
-            columns.append([Part.of(shown, step) for step, shown in itertools.islice(slopes_before, 1)])
+            step, shown = next(slopes_before)
+            columns.append([Part.of(shown, step)])
             continue
         found = [next(made) for _ in own]
         slopes = amplitudes(effect)

@@ -174,10 +174,9 @@ class InnovationSearch:
 
     @quietly
     def _begun(self, iterate: Iterate) -> "InnovationSearch":
+        """The search from where all samples say that the runs began."""
         problem = self.problem
-        weights = np.append(1.0, -np.linalg.solve(iterate.gram[1:, 1:], iterate.gram[1:, 0]))
-        left = jax.tree.map(lambda column: (column @ weights)[..., None], iterate.base)
-        found = smoothed(iterate.disturbance, iterate.followed.system, left)
+        found = smoothed(iterate.disturbance, iterate.followed.system, left_over(iterate.base, iterate.gram))
         fitted, prior = fitted_states(problem.vehicle.layout), np.diag(np.asarray(problem.start_std) ** 2)
         start = np.asarray(self.start) + np.where(fitted, np.asarray(found.start), 0.0)
         begin = np.where(np.outer(fitted, fitted), np.asarray(found.covariance), prior)
@@ -190,6 +189,12 @@ class InnovationSearch:
             if not before.likelihood_cost - iterate.likelihood_cost >= _LEAST_GAIN:
                 break
         return iterate
+
+
+def left_over(base: Columns, gram: Float[np.ndarray, "p1 p1"]) -> Columns:
+    """The innovations less their projection on the free parameters, the columns of `base`, by the products of all."""
+    weights = np.append(1.0, -np.linalg.solve(gram[1:, 1:], gram[1:, 0]))
+    return jax.tree.map(lambda column: (column @ weights)[..., None], base)
 
 
 def fitted_states(layout: Layout) -> Bool[np.ndarray, " s"]:

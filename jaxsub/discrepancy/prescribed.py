@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from ..arrays import Values, quietly
 from ..effects import AbstractEffect, AbstractSensor, amplitudes, by_name, with_numbers
-from ..likelihood import by_share, jacobians, share_of
+from ..likelihood import by_share, forces_at_ends, jacobians, joined, share_of
 from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .view import View
@@ -37,13 +37,10 @@ def prescribed_slopes(
         effect = with_numbers(effect, dict.fromkeys(amplitudes(effect), 0.0))
         vehicle = vehicle.without_effect(effect.label).with_effect(effect)
     followed, runs = view.followed, view.runs
-    force = np.asarray(followed.force)[:, :-1]
-    fade = np.exp(-np.asarray(runs.steps)[np.asarray(runs.step_of)][..., None] / np.asarray(view.disturbance.time))
-    push = np.stack([force, fade * force], axis=2)
+    push = forces_at_ends(np.asarray(followed.force), view.path.steps, np.asarray(view.disturbance.time))
     along = (followed.filtered, followed.expected, push)
     own = lambda some: (vehicle, runs.share(some), *share_of(along, some))
-    parts = by_share(_of_share, own, *runs.times.shape)
-    step, shown = (np.concatenate(own)[: len(runs.times)] for own in zip(*parts, strict=True))
+    step, shown = map(np.asarray, joined(by_share(_of_share, own, *runs.times.shape), len(runs.times)))
     return [(step[..., i], shown[..., i]) for i in range(len(effects))]
 
 

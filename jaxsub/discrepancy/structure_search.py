@@ -68,19 +68,19 @@ def answers(
     # a simulation that cannot be fitted proposes nothing
     searched = not baseline.fit.converged
     by_innovations = stepwise_by_innovations(fitter, baseline, vocabulary) if searched else None
-    if by_innovations is not None:
-        best, judged = by_innovations
-        if best.pieces > 1:
-            return best, judged, None
-        yield best, judged
-        found = examine(best.view, vocabulary, fitter.progress)
-    elif begin:
+    if begin and by_innovations is None:
         best, judged = warm_started(fitter, baseline, found, begin)
         if judged.named:
             best, judged = with_replacement(fitter.progress, best, judged)
             yield best, judged
             found = examine(best.view, vocabulary, fitter.progress)
     while True:
+        if by_innovations is not None:
+            best, judged = by_innovations[0], combined(judged, by_innovations[1])
+            if best.pieces > 1:
+                return best, judged, None
+            yield best, judged
+            found, by_innovations = examine(best.view, vocabulary, fitter.progress), None
         current, after = judge(found.naming, found.pattern, found.memory), None
         chosen = proposed_effects(found, current)
         # an effect dropped once and proposed again stays, or the search would cycle
@@ -99,11 +99,6 @@ def answers(
             by_innovations = None if searched else stepwise_by_innovations(fitter, best, vocabulary)
             searched = True
             if by_innovations is not None:
-                best, judged = by_innovations[0], combined(judged, by_innovations[1])
-                if best.pieces > 1:
-                    return best, judged, None
-                yield best, judged
-                found = examine(best.view, vocabulary, fitter.progress)
                 continue
             if current.verdict == "unknown" and refusals < settings.ALTERNATIVES:
                 refusals, after = refusals + 1, weighed(found.view, found.selector, fitter.progress)

@@ -30,7 +30,7 @@ from ..recording.runs import Runs
 from ..simulation import Trajectory
 from ..vehicle import AbstractVehicle, numbers_that_may_vary, quantities_of
 from . import settings
-from .innovation_search import InnovationSearch, Iterate, distinct, fitted_states, with_wide_priors
+from .innovation_search import InnovationSearch, Iterate, distinct, fitted_states, left_over, with_wide_priors
 from .tones import tones
 from .whiteness import record_sigma
 
@@ -241,8 +241,7 @@ def missing_force(view: View) -> tuple[Float[np.ndarray, "r k n"], Float[np.ndar
 def _left(view: View) -> Columns:
     """The innovations less their projection on the free parameters."""
     gram = np.sum(view.products(view.own, view.disturbance).products, axis=0) + view.prior
-    weights = np.array([1.0, *-np.linalg.solve(gram[1:, 1:], gram[1:, 0])])
-    return jax.tree.map(lambda column: (column @ weights)[..., None], view.base)
+    return left_over(view.base, gram)
 
 
 def facts(view: View) -> Facts:

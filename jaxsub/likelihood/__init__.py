@@ -17,7 +17,7 @@ from .disturbance import (
 )
 from .initial_disturbance import Response, first_guess, response
 from .innovation_products import part_length
-from .innovations import FilteredRuns, filter_runs
+from .innovations import FilteredRuns, filter_runs, forces_at_ends
 from .open_loop import open_loop_errors
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
 from .run_shares import by_share, joined, share_of, shares
@@ -42,6 +42,7 @@ __all__ = [
     "filter_runs",
     "first_guess",
     "force_columns",
+    "forces_at_ends",
     "group_means",
     "jacobians",
     "joined",

@@ -17,7 +17,7 @@ import numpy as np
 from jax.scipy.linalg import block_diag, cho_solve
 from jaxtyping import Array, Float
 
-from ..arrays import Values
+from ..arrays import Values, namespace
 from ..effects import AbstractSensor
 from ..programs import compiled
 from ..recording.runs import Runs
@@ -174,8 +174,17 @@ def _path(
     seen = (runs.times, runs.signals, outputs, runs.mask)
     expected, filtered = jax.vmap(run)(start, jnp.asarray(begin), *seen, nodes, runs.step_of, runs.live)
     force = filtered[..., s:]
-    kept = jnp.exp(-runs.steps[runs.step_of][..., None] / disturbance.time) * force[:, :-1]
-    return expected[..., :s], filtered[..., :s], force, jnp.stack([force[:, :-1], kept], axis=2)
+    push = forces_at_ends(force, runs.steps[runs.step_of], disturbance.time)
+    return expected[..., :s], filtered[..., :s], force, jnp.asarray(push)
+
+
+def forces_at_ends(
+    force: Float[Values, "r k n"], steps: Float[Values, "r k1"], time: Float[Values, " n"]
+) -> Float[Values, "r k1 2 n"]:
+    """A filtered force (N, N m) at both ends of each interval of `steps` s, over which it fades by its `time` in s."""
+    xp = namespace(force, steps)
+    kept = xp.exp(-steps[..., None] / time) * force[:, :-1]
+    return xp.stack([force[:, :-1], kept], axis=2)
 
 
 def _prompt(vehicle: AbstractVehicle, runs: Runs) -> tuple[AbstractVehicle, Float[Array, "r k c"]]:
