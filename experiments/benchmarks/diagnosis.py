@@ -13,9 +13,9 @@ import jax
 import numpy as np
 
 from jaxsub.cli import main as command_line
-from jaxsub.discrepancy.columns import candidate_columns
-from jaxsub.discrepancy.evidence import Evidence
-from jaxsub.discrepancy.view import View, facts, look
+from jaxsub.discrepancy.linearise.columns import candidate_columns
+from jaxsub.discrepancy.linearise.evidence import Evidence
+from jaxsub.discrepancy.linearise.view import View, facts, look
 from jaxsub.effects import AbstractEffect, candidates
 from jaxsub.estimate import Problem, fit
 

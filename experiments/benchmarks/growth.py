@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxsub.discrepancy.view import facts, look
+from jaxsub.discrepancy.linearise.view import facts, look
 from jaxsub.effects import candidates
 from jaxsub.estimate import Problem, fit
 from jaxsub.estimate.method import costs, lanes_for

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Array
 from scipy import stats
 
-from jaxsub.discrepancy.process_noise import LEVEL, Above, calibrated, noise_densities, noise_filter
+from jaxsub.discrepancy.explain.process_noise import LEVEL, Above, calibrated, noise_densities, noise_filter
 from jaxsub.effects import (
     VELOCITIES,
     AbstractForce,

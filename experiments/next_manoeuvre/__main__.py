@@ -15,10 +15,10 @@ import numpy as np
 
 from experiments.parts import main
 from jaxsub.discrepancy import diagnose
-from jaxsub.discrepancy.manoeuvre import Manoeuvre, recorded_limits, separating_manoeuvre
 from jaxsub.estimate import batch, search
 from jaxsub.information.design_limits import Bounds, ManoeuvreLimits
 from jaxsub.information.design_search import telegraphs
+from jaxsub.information.separating_manoeuvre import Manoeuvre, recorded_limits, separating_manoeuvre
 from jaxsub.recording import Recording
 from jaxsub.vehicle import AbstractVehicle
 

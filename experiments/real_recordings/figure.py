@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from jaxsub.discrepancy import Conclusions
-from jaxsub.discrepancy.diagnosis import Overlay
+from jaxsub.discrepancy.records.diagnosis import Overlay
 from jaxsub.report.drawing import BASELINE, GREY, IMPROVED, INK, new_figure, png, style, thin
 
 from .case import Case

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from jaxsub.cli.diagnose import answered, emit
 from jaxsub.discrepancy import Conclusions
-from jaxsub.discrepancy.diagnosis import ParameterEstimate
+from jaxsub.discrepancy.records.diagnosis import ParameterEstimate
 from jaxsub.vehicle import read_vehicle
 
 from .by_hand import by_hand

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, final
 from ..checks.estimated_noise import HARDLY_FOLLOWED, hardly_followed
 from ..discrepancy import Conclusions
 from ..discrepancy import diagnose as conclude
-from ..discrepancy.decisions import decision_rows
-from ..discrepancy.diagnosis import Coefficient, Location, Physics, Verdict
-from ..discrepancy.next_run import next_run, sentence
+from ..discrepancy.explain.next_run import next_run, sentence
 from ..discrepancy.procedure import Keep
-from ..discrepancy.progress import Progress
-from ..discrepancy.stored import STORED, load_conclusions, save_conclusions
+from ..discrepancy.records.decisions import decision_rows
+from ..discrepancy.records.diagnosis import Coefficient, Location, Physics, Verdict
+from ..discrepancy.records.progress import Progress
+from ..discrepancy.records.stored import STORED, load_conclusions, save_conclusions
 from ..effects import AbstractEffect
 from ..errors import InputError
 from ..estimate import require_free

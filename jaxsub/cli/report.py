@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..api.diagnoses import IMPROVED
-from ..discrepancy.stored import STORED, load_conclusions
+from ..discrepancy.records.stored import STORED, load_conclusions
 from ..errors import InputError
 from ..report import write_report
 from . import terminal

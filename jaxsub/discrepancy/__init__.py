@@ -1,6 +1,6 @@
 """Discrepancy: locate the mismatch, name what was left out, model it, show that it helps."""
 
-from .diagnosis import Conclusions
 from .procedure import diagnose
+from .records.diagnosis import Conclusions
 
 __all__ = ["Conclusions", "diagnose"]

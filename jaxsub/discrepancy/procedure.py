@@ -14,28 +14,28 @@ from ..recording import Recording
 from ..results import RESULTS
 from ..vehicle import AbstractVehicle, vehicle_findings
 from . import settings
-from .acceptance import Examination, Model, ModelFitter, fitted_model
-from .advice import next_manoeuvre
-from .consistency import consistent
-from .diagnosis import Candidate, Conclusions, ForceTrace, Location, Physics, Rival
-from .effect_forces import effect_forces
-from .evaluation import overlays
-from .examine import examine
-from .innovation_models import segmented
-from .kinds import leading, missing, right
-from .locate import Field, effect_shares, locations, shares, traces
-from .model import with_coloured_errors
-from .name import Named
-from .process_noise import noise_note, noise_signals
-from .progress import Progress, limited
-from .show import channel_quality, coefficients, estimates, replaced, run_quality, trades
-from .shown import shown_on
-from .structure_search import search_structure
-from .summary import summary
-from .surrogate import with_surrogate
-from .validation import beyond_noise
-from .verdict import Judged
-from .view import View, look
+from .accept.acceptance import Examination, Model, ModelFitter, fitted_model
+from .accept.model import with_coloured_errors
+from .accept.verdict import Judged
+from .explain.advice import next_manoeuvre
+from .explain.consistency import consistent
+from .explain.effect_forces import effect_forces
+from .explain.evaluation import overlays
+from .explain.kinds import leading, missing, right
+from .explain.locate import Field, effect_shares, locations, shares, traces
+from .explain.process_noise import noise_note, noise_signals
+from .explain.show import channel_quality, coefficients, estimates, replaced, run_quality, trades
+from .explain.shown import shown_on
+from .explain.summary import summary
+from .explain.validation import beyond_noise
+from .linearise.view import View, look
+from .propose.name import Named
+from .records.diagnosis import Candidate, Conclusions, ForceTrace, Location, Physics, Rival
+from .records.progress import Progress, limited
+from .search.examine import examine
+from .search.innovation_models import segmented
+from .search.structure_search import search_structure
+from .search.surrogate import with_surrogate
 
 # most rivals of an effect that are listed, and the posterior probability above which they are
 _LISTED, _LISTED_PROBABILITY = 4, 0.02

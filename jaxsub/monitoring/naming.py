@@ -16,9 +16,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import softmax
 
-from ..discrepancy.columns import candidate_columns
-from ..discrepancy.products import Products
-from ..discrepancy.view import View, facts
+from ..discrepancy.linearise.columns import candidate_columns
+from ..discrepancy.linearise.products import Products
+from ..discrepancy.linearise.view import View, facts
 from ..effects import AbstractEffect, amplitudes, candidates, parameter_table
 from ..estimate import side_by_side
 from ..likelihood import Columns, Disturbance, filter_runs, padded_width, total_products

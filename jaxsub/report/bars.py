@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from ..discrepancy.diagnosis import Candidate, Coefficient, Conclusions
+from ..discrepancy.records.diagnosis import Candidate, Coefficient, Conclusions
 from .drawing import GREY, IMPROVED, LOCATED, PALE, Picture, drawable, new_figure, png
 from .text import number, plain_label, power_of_ten
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..discrepancy.diagnosis import Conclusions, ForceTrace
+from ..discrepancy.records.diagnosis import Conclusions, ForceTrace
 from ..effects import CHANNEL_UNITS
 from .drawing import (
     BASELINE,

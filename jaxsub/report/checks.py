@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from ..discrepancy.diagnosis import Conclusions, Overlay, Remainder
+from ..discrepancy.records.diagnosis import Conclusions, Overlay, Remainder
 from .drawing import (
     BASELINE,
     GREY,

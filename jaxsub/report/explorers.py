@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..discrepancy.diagnosis import Conclusions, ForceTrace, Overlay
+from ..discrepancy.records.diagnosis import Conclusions, ForceTrace, Overlay
 from .by_state import state_unit
 from .drawing import BASELINE, IMPROVED, INK, thinned
 from .exploring import Choice, Drawing, Explorer, lines, tips

@@ -1,6 +1,6 @@
 """All figures of a report."""
 
-from ..discrepancy.diagnosis import Conclusions
+from ..discrepancy.records.diagnosis import Conclusions
 from .bars import draw_coefficients, draw_scan
 from .by_state import draw_by_state
 from .checks import draw_checks

@@ -8,7 +8,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ..discrepancy.diagnosis import Conclusions, ForceTrace, Location
+from ..discrepancy.records.diagnosis import Conclusions, ForceTrace, Location
 from ..effects import FORCE_UNITS
 from .drawing import (
     BASELINE,

@@ -5,7 +5,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from ..discrepancy.diagnosis import ChannelQuality, Conclusions, Overlay
+from ..discrepancy.records.diagnosis import ChannelQuality, Conclusions, Overlay
 from ..recording import Recording
 from ..vehicle import AbstractVehicle
 from .drawing import (

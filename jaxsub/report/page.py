@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 from markupsafe import Markup
 
-from ..discrepancy.decisions import decision_rows
-from ..discrepancy.diagnosis import Conclusions
+from ..discrepancy.records.decisions import decision_rows
+from ..discrepancy.records.diagnosis import Conclusions
 from ..storage import installed_version
 from . import tables, text
 from .bars import top_candidates

@@ -10,7 +10,7 @@ import tomlkit
 from markupsafe import Markup
 
 from ..discrepancy import settings
-from ..discrepancy.diagnosis import ChannelQuality, Conclusions, Location, Regime, Remainder
+from ..discrepancy.records.diagnosis import ChannelQuality, Conclusions, Location, Regime, Remainder
 from ..effects import FORCE_UNITS
 from ..findings import Finding
 from .text import (

@@ -17,7 +17,7 @@ from . import mathematics
 
 # modules that hold what a user needs and that their rooms do not hand on
 _BESIDE = (
-    "jaxsub.discrepancy.next_run",
+    "jaxsub.discrepancy.explain.next_run",
     "jaxsub.filter.ekf",
     "jaxsub.information.design_limits",
     "jaxsub.recording.logs",

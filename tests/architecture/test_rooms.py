@@ -18,6 +18,8 @@ ORDER = (
     "filter", "navigation", "likelihood", "estimate", "information", "checks", "discrepancy", "monitoring", "control",
     "sweeps", "report", "api", "cli", "__main__",
 )  # fmt: skip
+# of the room of diagnosis, lowest first
+STEPS = ("settings", "programs", "records", "linearise", "propose", "accept", "search", "explain", "procedure")
 
 
 def room(path):
@@ -25,8 +27,8 @@ def room(path):
     return path.relative_to(HOUSE).parts[0].removesuffix(".py")
 
 
-def imported(path, tree):
-    """The rooms that a file imports, by absolute and by relative imports, wherever in it they stand."""
+def imported(path, tree, within="jaxsub"):
+    """The rooms that a file imports, or parts of one, by absolute and relative imports, wherever in it they stand."""
     package = ("jaxsub", *path.relative_to(HOUSE).parts[:-1])
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -37,7 +39,8 @@ def imported(path, tree):
             names = [[*base, alias.name] for alias in node.names]
         else:
             continue
-        yield from (name[1] for name in names if name[0] == "jaxsub" and len(name) > 1)
+        depth = within.count(".") + 1
+        yield from (name[depth] for name in names if name[:depth] == within.split(".") and len(name) > depth)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOUSE)))
@@ -49,6 +52,22 @@ def test_file_imports_only_rooms_to_its_left(path):
     for other in imported(path, ast.parse(path.read_text(encoding="utf-8"))):
         assert other in ORDER, f"imports {other}, which is no room"
         assert ORDER.index(other) <= ORDER.index(here), f"{here} imports {other}"
+
+
+@pytest.mark.parametrize(
+    "path", [path for path in FILES if path.parent.parent == HOUSE / "discrepancy"], ids=lambda p: p.stem
+)
+def test_steps_of_a_diagnosis_import_only_earlier_ones(path):
+    """Claim: what proposes does not know what accepts, nor either of them what explains the answer."""
+    for other in imported(path, ast.parse(path.read_text(encoding="utf-8")), "jaxsub.discrepancy"):
+        assert STEPS.index(other) <= STEPS.index(path.parent.name), f"imports {other}"
+
+
+def test_every_part_of_the_room_of_diagnosis_is_a_step():
+    """Claim: no module stands beside the steps, in the order of which they import each other."""
+    assert {path.name.removesuffix(".py") for path in (HOUSE / "discrepancy").iterdir()} - {"__pycache__"} == {
+        *STEPS, "__init__",
+    }  # fmt: skip
 
 
 def test_the_reader_of_imports_sees_every_form():

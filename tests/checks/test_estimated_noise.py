@@ -9,7 +9,7 @@ from rigs import oscillator
 from jaxsub.api.diagnoses import _warned
 from jaxsub.checks.estimated_noise import hardly_followed
 from jaxsub.discrepancy import Conclusions
-from jaxsub.discrepancy.diagnosis import ChannelQuality
+from jaxsub.discrepancy.records.diagnosis import ChannelQuality
 from jaxsub.recording import Recording
 
 TIMES = 0.1 * np.arange(200)

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy.acceptance import CandidateModels, Examination, Model, ModelFitter, fitted_model
-from jaxsub.discrepancy.examine import listed, weighed
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.accept.acceptance import CandidateModels, Examination, Model, ModelFitter, fitted_model
+from jaxsub.discrepancy.linearise.view import look
+from jaxsub.discrepancy.search.examine import listed, weighed
 from jaxsub.effects import AbstractEffect, CoulombFriction, CubicDamping, CubicStiffness, QuadraticDamping, SensorScale
 from jaxsub.estimate import batch, fit
 from jaxsub.simulation import synthetic

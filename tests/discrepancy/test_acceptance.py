@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from lacking_rig import CUBIC, DRAG, FITTER, SPRING, labels, lacking, models, numbers
 
-from jaxsub.discrepancy.acceptance import CandidateModels, accept_jointly, accept_singly
-from jaxsub.discrepancy.name import Named
-from jaxsub.discrepancy.structure_search import without_redundant
-from jaxsub.discrepancy.verdict import Judged
+from jaxsub.discrepancy.accept.acceptance import CandidateModels, accept_jointly, accept_singly
+from jaxsub.discrepancy.accept.verdict import Judged
+from jaxsub.discrepancy.propose.name import Named
+from jaxsub.discrepancy.search.structure_search import without_redundant
 from jaxsub.effects import CubicDamping, QuadraticDamping
 
 FRICTION, SCALE = "coulomb-friction[x]", "sensor-scale[x]"

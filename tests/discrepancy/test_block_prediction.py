@@ -4,8 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsub.discrepancy.products import Products, conditional
-from jaxsub.discrepancy.view import Parts
+from jaxsub.discrepancy.linearise.products import Products, conditional
+from jaxsub.discrepancy.linearise.view import Parts
 from jaxsub.likelihood import Disturbance
 
 

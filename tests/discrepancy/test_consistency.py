@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jaxsub.discrepancy.consistency import assessed, compared, consistent, noise
-from jaxsub.discrepancy.diagnosis import ChannelQuality, Explained, Location, Physics
+from jaxsub.discrepancy.accept.verdict import Judged
+from jaxsub.discrepancy.explain.consistency import assessed, compared, consistent, noise
+from jaxsub.discrepancy.explain.summary import summary
+from jaxsub.discrepancy.records.diagnosis import ChannelQuality, Explained, Location, Physics
 from jaxsub.discrepancy.settings import LARGE_ERROR
-from jaxsub.discrepancy.summary import summary
-from jaxsub.discrepancy.verdict import Judged
 from jaxsub.plain import finite_text, to_json
 from jaxsub.recording import Recording
 

@@ -9,9 +9,17 @@ import pytest
 from rigs import driven, oscillator
 from scipy import stats
 
-from jaxsub.discrepancy.cross_validation import Comparison, Gain, Predicted, compare, gain, one_step_ahead, simulated
-from jaxsub.discrepancy.verdict import NOTHING, with_gain
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.accept.cross_validation import (
+    Comparison,
+    Gain,
+    Predicted,
+    compare,
+    gain,
+    one_step_ahead,
+    simulated,
+)
+from jaxsub.discrepancy.accept.verdict import NOTHING, with_gain
+from jaxsub.discrepancy.linearise.view import look
 from jaxsub.estimate import batch, fit
 from jaxsub.likelihood import BlockLinearised, whitened
 from jaxsub.simulation import synthetic

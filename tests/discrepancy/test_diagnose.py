@@ -11,9 +11,9 @@ import pytest
 from diagnosis_cases import INTERVAL, SAMPLES, SMALL, disturbed, recorded, require_named, wrong
 
 from jaxsub.discrepancy import diagnose
-from jaxsub.discrepancy.locate import traces
-from jaxsub.discrepancy.next_run import next_run, sentence
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.explain.locate import traces
+from jaxsub.discrepancy.explain.next_run import next_run, sentence
+from jaxsub.discrepancy.linearise.view import look
 from jaxsub.effects import AbstractForce
 from jaxsub.effects.base import amplitude
 from jaxsub.effects.hull import CrossflowDrag, HullAsymmetry

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from diagnosis_cases import recorded
 
-from jaxsub.discrepancy.effect_forces import effect_forces
-from jaxsub.discrepancy.locate import traces
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.explain.effect_forces import effect_forces
+from jaxsub.discrepancy.explain.locate import traces
+from jaxsub.discrepancy.linearise.view import look
 from jaxsub.effects import SensorScale
 from jaxsub.effects.hull_damping import QuadraticDamping
 from jaxsub.estimate import fit

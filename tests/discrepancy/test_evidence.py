@@ -11,14 +11,14 @@ from diagnosis_cases import INTERVAL, recorded, wrong
 from jax import Array
 from scipy import stats
 
-from jaxsub.discrepancy.columns import candidate_columns, plausible, sensor_changes
-from jaxsub.discrepancy.evidence import Evidence, evidence_of
-from jaxsub.discrepancy.locate import effect_shares
-from jaxsub.discrepancy.model import is_admissible
-from jaxsub.discrepancy.name import select
-from jaxsub.discrepancy.products import Products, conditional
-from jaxsub.discrepancy.selector import Selector
-from jaxsub.discrepancy.view import Parts, facts, look
+from jaxsub.discrepancy.accept.model import is_admissible
+from jaxsub.discrepancy.explain.locate import effect_shares
+from jaxsub.discrepancy.linearise.columns import candidate_columns, plausible, sensor_changes
+from jaxsub.discrepancy.linearise.evidence import Evidence, evidence_of
+from jaxsub.discrepancy.linearise.products import Products, conditional
+from jaxsub.discrepancy.linearise.view import Parts, facts, look
+from jaxsub.discrepancy.propose.name import select
+from jaxsub.discrepancy.propose.selector import Selector
 from jaxsub.effects import AbstractInstrument, FluidMemory, amplitude, candidates
 from jaxsub.effects.hull import CrossflowDrag
 from jaxsub.effects.sensor_mounting import SensorLeverArm

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from rigs import oscillator
 
-from jaxsub.discrepancy.acceptance import Model, ModelFitter
-from jaxsub.discrepancy.cross_validation import Predicted, one_step_ahead
-from jaxsub.discrepancy.evaluation import evaluated
-from jaxsub.discrepancy.evidence import evidence_of
-from jaxsub.discrepancy.examine import listed
-from jaxsub.discrepancy.innovation_models import InnovationModels, segmented, segments_needed, selector_without
-from jaxsub.discrepancy.innovation_search import InnovationSearch, with_wide_priors
-from jaxsub.discrepancy.name import Named
-from jaxsub.discrepancy.restarts import restarted
+from jaxsub.discrepancy.accept.acceptance import Model, ModelFitter
+from jaxsub.discrepancy.accept.cross_validation import Predicted, one_step_ahead
+from jaxsub.discrepancy.accept.restarts import restarted
+from jaxsub.discrepancy.explain.evaluation import evaluated
+from jaxsub.discrepancy.linearise.evidence import evidence_of
+from jaxsub.discrepancy.linearise.innovation_search import InnovationSearch, with_wide_priors
+from jaxsub.discrepancy.linearise.view import led_from
+from jaxsub.discrepancy.propose.name import Named
+from jaxsub.discrepancy.search.examine import listed
+from jaxsub.discrepancy.search.innovation_models import InnovationModels, segmented, segments_needed, selector_without
+from jaxsub.discrepancy.search.stepwise import backward_eliminated, stepwise_by_innovations
 from jaxsub.discrepancy.settings import BLOCKS
-from jaxsub.discrepancy.stepwise import backward_eliminated, stepwise_by_innovations
-from jaxsub.discrepancy.view import led_from
 from jaxsub.effects import CubicStiffness, numbers
 from jaxsub.effects.actuator_curves import ActuatorDeadband
 from jaxsub.effects.hull_damping import CubicDamping, QuadraticDamping

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from diagnosis_cases import disturbed, recorded, wrong
 
-from jaxsub.discrepancy.examine import examine
-from jaxsub.discrepancy.kinds import leading, missing, right
-from jaxsub.discrepancy.model import fit_with
-from jaxsub.discrepancy.name import Named
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.accept.model import fit_with
+from jaxsub.discrepancy.explain.kinds import leading, missing, right
+from jaxsub.discrepancy.linearise.view import look
+from jaxsub.discrepancy.propose.name import Named
+from jaxsub.discrepancy.search.examine import examine
 from jaxsub.effects import ActuatorLag, CrossflowDrag, Current, SensorScale
 from jaxsub.estimate import batch, fit
 from jaxsub.vehicle.catalogue import dsrv

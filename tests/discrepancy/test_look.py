@@ -12,12 +12,12 @@ from diagnosis_cases import recorded, wrong
 from rigs import driven, oscillator
 
 from jaxsub.discrepancy import innovation_search, view
-from jaxsub.discrepancy.columns import columns_of
-from jaxsub.discrepancy.consistency import expected_errors
-from jaxsub.discrepancy.diagnosis import ChannelQuality
-from jaxsub.discrepancy.evidence import Evidence, evidence_of
-from jaxsub.discrepancy.examine import listed
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.explain.consistency import expected_errors
+from jaxsub.discrepancy.linearise.columns import columns_of
+from jaxsub.discrepancy.linearise.evidence import Evidence, evidence_of
+from jaxsub.discrepancy.linearise.view import look
+from jaxsub.discrepancy.records.diagnosis import ChannelQuality
+from jaxsub.discrepancy.search.examine import listed
 from jaxsub.effects import ActuatorLag, CubicDamping, CubicStiffness, QuadraticDamping, SensorDelay
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.estimate import batch, fit

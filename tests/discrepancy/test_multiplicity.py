@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from jaxsub.discrepancy.multiplicity import family_wise, independent_tests
+from jaxsub.discrepancy.propose.multiplicity import family_wise, independent_tests
 
 
 def test_independent_candidates_count_as_many_as_they_are():

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from diagnosis_cases import INTERVAL, SAMPLES
 
-from jaxsub.discrepancy.locate import Field, locations, traces
-from jaxsub.discrepancy.process_noise import NoiseSignal, calibrated, noise_note, noise_signals
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.explain.locate import Field, locations, traces
+from jaxsub.discrepancy.explain.process_noise import NoiseSignal, calibrated, noise_note, noise_signals
+from jaxsub.discrepancy.linearise.view import look
 from jaxsub.effects import ActuatorLag
 from jaxsub.estimate import batch, fit
 from jaxsub.recording import Recording

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxsub.discrepancy.regime import regime, regime_variables
-from jaxsub.discrepancy.show import trades
+from jaxsub.discrepancy.explain.regime import regime, regime_variables
+from jaxsub.discrepancy.explain.show import trades
 from jaxsub.estimate import Solution
 from jaxsub.vehicle.catalogue import nps_auv_ii
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy.acceptance import fitted_model
-from jaxsub.discrepancy.replacement import with_replacement
-from jaxsub.discrepancy.verdict import NOTHING
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.accept.acceptance import fitted_model
+from jaxsub.discrepancy.accept.verdict import NOTHING
+from jaxsub.discrepancy.linearise.view import look
+from jaxsub.discrepancy.search.replacement import with_replacement
 from jaxsub.effects import QuadraticDamping
 from jaxsub.estimate import batch, fit
 from jaxsub.simulation import synthetic

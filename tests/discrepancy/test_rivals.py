@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import special
 
-from jaxsub.discrepancy.cross_validation import Predicted
-from jaxsub.discrepancy.rivals import robust_log_evidence
+from jaxsub.discrepancy.accept.cross_validation import Predicted
+from jaxsub.discrepancy.accept.rivals import robust_log_evidence
 
 BLOCKS = 48
 

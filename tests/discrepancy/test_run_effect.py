@@ -8,11 +8,11 @@ from scipy import stats
 from scipy.optimize import minimize_scalar
 
 from jaxsub.discrepancy import diagnose
-from jaxsub.discrepancy.cross_validation import simulated
-from jaxsub.discrepancy.examine import listed
-from jaxsub.discrepancy.model import p_value, restricted_log_likelihood, without_variation
-from jaxsub.discrepancy.products import Products, integrated
-from jaxsub.discrepancy.view import facts, look
+from jaxsub.discrepancy.accept.cross_validation import simulated
+from jaxsub.discrepancy.accept.model import p_value, restricted_log_likelihood, without_variation
+from jaxsub.discrepancy.linearise.products import Products, integrated
+from jaxsub.discrepancy.linearise.view import facts, look
+from jaxsub.discrepancy.search.examine import listed
 from jaxsub.effects import CoulombFriction, RunVariation, SensorBias, SensorDrift
 from jaxsub.estimate import batch, fit
 from jaxsub.likelihood import Disturbance

@@ -6,10 +6,10 @@ import pytest
 from lacking_rig import DRAG, FITTER, KINDS, lacking
 from rigs import oscillator
 
-from jaxsub.discrepancy.acceptance import ModelFitter
-from jaxsub.discrepancy.examine import examine
-from jaxsub.discrepancy.structure_search import reconsidered, search_structure
-from jaxsub.discrepancy.verdict import judge
+from jaxsub.discrepancy.accept.acceptance import ModelFitter
+from jaxsub.discrepancy.accept.verdict import judge
+from jaxsub.discrepancy.search.examine import examine
+from jaxsub.discrepancy.search.structure_search import reconsidered, search_structure
 from jaxsub.effects import SensorScale
 
 

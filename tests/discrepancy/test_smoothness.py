@@ -4,8 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 from scipy import special, stats
 
-from jaxsub.discrepancy.products import Products
-from jaxsub.discrepancy.smoothness import FINE, coarse, smoothest
+from jaxsub.discrepancy.linearise.products import Products
+from jaxsub.discrepancy.propose.smoothness import FINE, coarse, smoothest
 from jaxsub.effects import KNOTS, Motion, SmoothForce
 from jaxsub.likelihood import Disturbance
 

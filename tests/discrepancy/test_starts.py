@@ -10,9 +10,9 @@ from experiments.concealed_physics.plan import cases
 from experiments.next_manoeuvre.cases import case
 from jaxsub.cli.runs import load_runs
 from jaxsub.discrepancy import diagnose
-from jaxsub.discrepancy.model import are_significant, fit_with
-from jaxsub.discrepancy.name import Named, refitted
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.accept.model import are_significant, fit_with
+from jaxsub.discrepancy.linearise.view import look
+from jaxsub.discrepancy.propose.name import Named, refitted
 from jaxsub.effects import (
     ActuatorRateLimit,
     CoulombFriction,

@@ -4,11 +4,11 @@ import pytest
 from diagnosis_cases import recorded, wrong
 from lacking_rig import FITTER, KINDS, SPRING, lacking, models, numbers
 
-from jaxsub.discrepancy.examine import examine
-from jaxsub.discrepancy.model import fit_with
-from jaxsub.discrepancy.surrogate import with_surrogate
-from jaxsub.discrepancy.verdict import Judged
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.accept.model import fit_with
+from jaxsub.discrepancy.accept.verdict import Judged
+from jaxsub.discrepancy.linearise.view import look
+from jaxsub.discrepancy.search.examine import examine
+from jaxsub.discrepancy.search.surrogate import with_surrogate
 from jaxsub.effects.hull import HullAsymmetry
 from jaxsub.effects.hull_damping import QuadraticDamping
 from jaxsub.estimate import batch, fit

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxsub.discrepancy.tones import tones
+from jaxsub.discrepancy.linearise.tones import tones
 
 BAND = (0.2, 7.0)
 

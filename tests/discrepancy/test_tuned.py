@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from diagnosis_cases import INTERVAL, SAMPLES, recorded, wrong
 
-from jaxsub.discrepancy.tuned import tuned
-from jaxsub.discrepancy.view import facts, look
+from jaxsub.discrepancy.linearise.view import facts, look
+from jaxsub.discrepancy.propose.tuned import tuned
 from jaxsub.effects.environment import WaveForcing
 from jaxsub.estimate import batch, fit
 

@@ -7,13 +7,20 @@ import jax.numpy as jnp
 import numpy as np
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy.acceptance import Examination, Model, ModelFitter, dominant, fitted_model, proposed_effects
-from jaxsub.discrepancy.examine import listed, weighed
-from jaxsub.discrepancy.progress import OutOfTime
-from jaxsub.discrepancy.surrogate import most_explaining, with_surrogate
-from jaxsub.discrepancy.verdict import Judged
-from jaxsub.discrepancy.view import look
-from jaxsub.discrepancy.whiteness import Memory
+from jaxsub.discrepancy.accept.acceptance import (
+    Examination,
+    Model,
+    ModelFitter,
+    dominant,
+    fitted_model,
+    proposed_effects,
+)
+from jaxsub.discrepancy.accept.verdict import Judged
+from jaxsub.discrepancy.linearise.view import look
+from jaxsub.discrepancy.linearise.whiteness import Memory
+from jaxsub.discrepancy.records.progress import OutOfTime
+from jaxsub.discrepancy.search.examine import listed, weighed
+from jaxsub.discrepancy.search.surrogate import most_explaining, with_surrogate
 from jaxsub.effects import CubicDamping, CubicStiffness, QuadraticDamping, SensorScale
 from jaxsub.estimate import batch, fit
 from jaxsub.simulation import synthetic

@@ -7,7 +7,7 @@ import pytest
 from rigs import oscillator
 from scipy.signal import lfilter
 
-from jaxsub.discrepancy.validation import beyond_noise, correlation, remainders
+from jaxsub.discrepancy.explain.validation import beyond_noise, correlation, remainders
 from jaxsub.recording import Recording
 from jaxsub.simulation.manoeuvres import prbs
 from jaxsub.vehicle import Output

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxsub.discrepancy.whiteness import memory
+from jaxsub.discrepancy.linearise.whiteness import memory
 from jaxsub.likelihood.whiteness import portmanteau, remembered
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy.acceptance import ModelFitter, fitted_model
-from jaxsub.discrepancy.view import look
+from jaxsub.discrepancy.accept.acceptance import ModelFitter, fitted_model
+from jaxsub.discrepancy.linearise.view import look
 from jaxsub.effects import CubicStiffness, QuadraticDamping
 from jaxsub.effects.memory import Hysteresis
 from jaxsub.estimate import batch, evaluate, fit, gauss_newton, initial_guess

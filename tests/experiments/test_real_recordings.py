@@ -9,7 +9,7 @@ from experiments.real_recordings import emps, rolldecay, seaglider, silverbox, s
 from experiments.real_recordings.by_hand import free_run_errors
 from experiments.real_recordings.preparation import held_means, mid_interval
 from experiments.real_recordings.run import in_field_units
-from jaxsub.discrepancy.diagnosis import ParameterEstimate
+from jaxsub.discrepancy.records.diagnosis import ParameterEstimate
 from jaxsub.recording import Recording
 from jaxsub.vehicle import read_vehicle
 

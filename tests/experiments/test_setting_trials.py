@@ -7,7 +7,7 @@ from experiments.settings.assemble import assemble
 from experiments.settings.tables import tables
 from experiments.settings.trials import CASES, changed, described, scaled, trials
 from jaxsub.discrepancy import settings
-from jaxsub.discrepancy.cross_validation import Comparison, Gain
+from jaxsub.discrepancy.accept.cross_validation import Comparison, Gain
 
 
 @pytest.mark.parametrize(

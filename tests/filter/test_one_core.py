@@ -21,7 +21,7 @@ import jax.numpy as jnp
 """
 COMPILES = """
 from rigs import oscillator, recorded
-from jaxsub.discrepancy.process_noise import noise_densities
+from jaxsub.discrepancy.explain.process_noise import noise_densities
 vehicle = oscillator()
 runs = recorded(vehicle, 1, 12, 0.1, seed=1)
 noise_densities(vehicle, runs, jnp.zeros((1, 2)), jnp.array([0.01, 0.02]), jnp.ones((1, *runs.outputs.shape)))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from rigs import oscillator, recorded
 
-from jaxsub.discrepancy.cross_validation import simulated
-from jaxsub.discrepancy.view import guessed
+from jaxsub.discrepancy.accept.cross_validation import simulated
+from jaxsub.discrepancy.linearise.view import guessed
 from jaxsub.estimate import estimate_disturbance, fit
 from jaxsub.information import coloured_covariance, identifiability
 from jaxsub.likelihood import Disturbance, blocks, filter_runs, output_errors, run_shares

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from report_traces import BEFORE, CHANNELS, COEFFICIENTS, overlay, trace
 
-from jaxsub.discrepancy.diagnosis import (
+from jaxsub.discrepancy.records.diagnosis import (
     Candidate,
     ChannelQuality,
     Coefficient,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from jaxsub.discrepancy.diagnosis import ForceTrace, Overlay
+from jaxsub.discrepancy.records.diagnosis import ForceTrace, Overlay
 
 EQUATIONS = {"surge": 40.0, "sway": 900.0, "heave": 60.0, "roll": 15.0, "pitch": 120.0, "yaw": 1400.0}
 CHANNELS = {

@@ -19,7 +19,7 @@ from jaxsub.api.diagnoses import Diagnosis
 from jaxsub.cli import main
 from jaxsub.cli.diagnose import added, emit
 from jaxsub.cli.options import Options
-from jaxsub.discrepancy.diagnosis import Explained
+from jaxsub.discrepancy.records.diagnosis import Explained
 from jaxsub.effects import QuadraticDamping, numbers, vocabulary
 from jaxsub.report.text import file_stem
 from jaxsub.vehicle.catalogue import dsrv

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from report_examples import VEHICLE, bare, diagnosis
 
-from jaxsub.discrepancy.diagnosis import Overlay
+from jaxsub.discrepancy.records.diagnosis import Overlay
 from jaxsub.report.explorers import explorers
 from jaxsub.report.exploring import script
 from jaxsub.report.page import render

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from report_examples import VEHICLE, diagnosis
 
-from jaxsub.discrepancy.diagnosis import Explained, ParameterEstimate
+from jaxsub.discrepancy.records.diagnosis import Explained, ParameterEstimate
 from jaxsub.findings import Finding
 from jaxsub.plain import to_json
 from jaxsub.report import write_report

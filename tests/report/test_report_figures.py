@@ -15,7 +15,7 @@ from PIL import Image
 from report_examples import diagnosis
 from report_traces import CHANNELS
 
-from jaxsub.discrepancy.diagnosis import ForceTrace
+from jaxsub.discrepancy.records.diagnosis import ForceTrace
 from jaxsub.report import figures
 from jaxsub.report.bars import draw_scan, moved_coefficients
 from jaxsub.report.drawing import LONGEST, drawable, style, thin

@@ -11,7 +11,7 @@ import pytest
 from report_examples import VEHICLE, bare, diagnosis
 from report_traces import CHANNELS, COEFFICIENTS
 
-from jaxsub.discrepancy.diagnosis import Rival
+from jaxsub.discrepancy.records.diagnosis import Rival
 from jaxsub.report import draw
 from jaxsub.report.page import TITLE, render
 from jaxsub.report.text import plain_label

@@ -5,7 +5,7 @@ import dataclasses
 import tomlkit
 from report_examples import VEHICLE, bare, diagnosis
 
-from jaxsub.discrepancy.diagnosis import Location
+from jaxsub.discrepancy.records.diagnosis import Location
 from jaxsub.report import tables
 
 

@@ -9,8 +9,8 @@ from report_examples import VEHICLE, bare, diagnosis
 from jaxsub.api.diagnoses import Diagnosis
 from jaxsub.cli import main
 from jaxsub.cli.output import fresh_folder
-from jaxsub.discrepancy.decisions import Decision
-from jaxsub.discrepancy.stored import load_conclusions, save_conclusions
+from jaxsub.discrepancy.records.decisions import Decision
+from jaxsub.discrepancy.records.stored import load_conclusions, save_conclusions
 from jaxsub.errors import InputError
 from jaxsub.report.page import render
 from jaxsub.vehicle.catalogue import dsrv
@@ -102,7 +102,7 @@ def test_what_cannot_be_read_is_said_in_one_line(written, capsys, damage):
 
 
 def test_another_schema_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("jaxsub.discrepancy.stored._SCHEMA", 2)
+    monkeypatch.setattr("jaxsub.discrepancy.records.stored._SCHEMA", 2)
     save_conclusions(bare(), tmp_path / "diagnosis.npz")
     monkeypatch.undo()
     with pytest.raises(InputError, match="has schema 2 and not 1"):

@@ -1,0 +1,1 @@
+"""A fitted model linearised about its filtered trajectory, and the evidence of candidates there."""

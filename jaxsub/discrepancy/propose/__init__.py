@@ -1,0 +1,1 @@
+"""Which effects, or which nonparametric force, explain the mismatch best by the linearised model."""
