@@ -11,8 +11,8 @@ import scipy.stats
 from diagnosis_cases import recorded, wrong
 from rigs import driven, oscillator
 
-from jaxsub.discrepancy import innovation_search, view
 from jaxsub.discrepancy.explain.consistency import expected_errors
+from jaxsub.discrepancy.linearise import innovation_search, view
 from jaxsub.discrepancy.linearise.columns import columns_of
 from jaxsub.discrepancy.linearise.evidence import Evidence, evidence_of
 from jaxsub.discrepancy.linearise.view import look

@@ -20,7 +20,7 @@ from jaxsub.vehicle import read_vehicle, write_vehicle
 PROGRAM = """
 import os, sys
 from jaxsub.cli import main
-from jaxsub.discrepancy import structure_search
+from jaxsub.discrepancy.search import structure_search
 from jaxsub.effects import mechanisms, hull_damping
 from jaxsub.cli import diagnose
 diagnose.vocabulary = lambda: (mechanisms.CoulombFriction, hull_damping.QuadraticDamping)
