@@ -29,3 +29,9 @@ def aligned_zeros(shape: tuple[int, ...], dtype: Any = float) -> np.ndarray:
     memory = np.zeros(size + width, np.uint8)
     first = -memory.ctypes.data % width
     return memory[first : first + size].view(dtype).reshape(shape)
+
+
+@quietly
+def single(values: np.ndarray) -> np.ndarray:
+    """`values` in single precision: infinite beyond it, as of a simulation that diverges."""
+    return values.astype(np.float32)

@@ -87,14 +87,14 @@ def _keep_residual(made: Drawing, place: str, overlay: Overlay, channel: str, mo
     kept = thinned(measured - shown["baseline"], made.longest)
     made.keep(place, time=overlay.times[kept], measured=measured[kept])
     spectra = {model: spectrum(overlay.times, measured - values) for model, values in shown.items()}
-    # a model that diverged has none
     frequency = max((own for own, _ in spectra.values()), key=len)
     chosen = np.unique(np.geomspace(1, max(frequency.size, 1), made.longest // 4).astype(int)) - 1
     chosen = chosen[: frequency.size]
     made.keep(place, frequency=frequency[chosen])
     for model, values in shown.items():
-        own = spectra[model][1]
-        density = own if own.size else np.full(frequency.size, np.nan)
+        at, own = spectra[model]
+        # one that diverged on the way has coarser frequencies of its own, or none
+        density = np.interp(frequency, at, own, np.nan, np.nan) if at.size else np.full(frequency.size, np.nan)
         left = {"": values[kept], "_residual": (measured - values)[kept], "_density": density[chosen]}
         made.keep(place, **{f"{model}{suffix}": one for suffix, one in left.items()})
 

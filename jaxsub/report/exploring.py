@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from markupsafe import Markup
 
+from ..arrays import single
 from .drawing import GREY, PALE
 
 # Bokeh takes two seconds to import, and is imported by what draws with it
@@ -70,7 +71,8 @@ class Drawing:
 
         for key, value in values.items():
             # seconds since 1970 need more digits
-            kept = value.astype(float if key == "time" else np.float32) if isinstance(value, np.ndarray) else value
+            precise = not isinstance(value, np.ndarray) or key == "time"
+            kept = value if precise else single(value)
             # plain, so that no name is read as a formula
             self.store[f"{place}/{key}"] = PlainText(text=kept) if isinstance(kept, str) else kept
 

@@ -12,6 +12,7 @@ import pytest
 from report_examples import VEHICLE, bare, diagnosis
 
 from jaxsub.discrepancy.records.diagnosis import Overlay
+from jaxsub.discrepancy.records.stored import load_conclusions, save_conclusions
 from jaxsub.report.explorers import explorers
 from jaxsub.report.exploring import script
 from jaxsub.report.page import render
@@ -121,6 +122,19 @@ def test_the_page_is_at_most_three_megabytes(report):
     longer = sum(len(one.data) for one in of.values()) - sum(len(one.data) for one in explorers(made).values())
     assert still + longer <= 3_000_000
     assert 5 <= len(of["residuals"].choices[0].options) < 30
+
+
+def test_a_baseline_that_diverges_on_the_way_is_drawn_as_far_as_it_goes(tmp_path):
+    """Claim: beside the spectrum of a model that does not diverge, and stored with numbers beyond single precision."""
+    made = diagnosis("named")
+    overlay = made.overlays[0]
+    gone = np.where(overlay.times > 0.4 * overlay.times[-1], np.inf, 0.0)
+    gone[np.flatnonzero(gone)[:9]] = 1e60
+    baseline = {channel: values + gone for channel, values in overlay.baseline.items()}
+    made = dataclasses.replace(made, overlays=[dataclasses.replace(overlay, baseline=baseline)])
+    save_conclusions(made, tmp_path / "diagnosis.npz")
+    again = load_conclusions(tmp_path / "diagnosis.npz")
+    assert {*explorers(made)} == {*explorers(again)} == {"forces", "residuals"}
 
 
 def test_no_name_ends_the_data_or_is_a_formula():

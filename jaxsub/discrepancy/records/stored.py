@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import single
 from ...errors import InputError
 from ...storage import opened_archive, write_archive
 from .diagnosis import Conclusions
@@ -46,7 +47,7 @@ def load_conclusions(path: Path) -> Conclusions:
 def _encoded(value: Any, arrays: list[np.ndarray], name: str = "") -> Any:
     """`value` as JSON has it, its arrays appended to `arrays`; `name` is that of the field it is in."""
     if isinstance(value, np.ndarray):
-        arrays.append(value.astype(np.float64 if name == "times" else np.float32))
+        arrays.append(value.astype(np.float64) if name == "times" else single(value))
         return len(arrays) - 1
     if dataclasses.is_dataclass(value):
         return {
