@@ -274,6 +274,11 @@ class AbstractSensor(AbstractInstrument):
         """The one."""
         return (self.channel,)
 
+    @property
+    def delay(self) -> Signal | float:
+        """How late its readings are, s."""
+        return 0.0
+
     def show(
         self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
     ) -> dict[str, Float[Signal, " *k"]]:

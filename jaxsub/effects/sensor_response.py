@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..arrays import namespace
@@ -40,21 +39,26 @@ class SensorDelay(AbstractSensor):
         """The delay."""
         return f"{self.channel} measured(t) = {self.channel}(t - τ)"
 
+    @property
+    def delay(self) -> Signal | float:
+        """None where it would be ahead."""
+        return namespace(self.tau).maximum(self.tau, 0.0)
+
     def measure(
         self, times: Float[Signal, " *k"], outputs: Mapping[str, Signal], motion: Motion
     ) -> Float[Signal, " *k"]:
         """The output a while ago."""
         xp = namespace(times, self.tau)
         late = xp.vectorize(xp.interp, signature="(k),(k),(k)->(k)")
-        return late(times - xp.maximum(self.tau, 0.0), times, xp.asarray(outputs[self.channel]))
+        return late(times - self.delay, times, xp.asarray(outputs[self.channel]))
 
     def remembered(self, interval: float) -> int:
         """The samples of the delay."""
-        return math.ceil(max(float(self.tau), 0.0) / interval)
+        return math.ceil(float(self.delay) / interval)
 
     def undone(self, times: Float[Signal, " *k"], recorded: Float[Signal, " *k"]) -> Float[Signal, " *k"]:
         """What was shown a while later."""
-        return jnp.interp(times + jnp.maximum(self.tau, 0.0), times, recorded)
+        return namespace(times, recorded, self.tau).interp(times + self.delay, times, recorded)
 
 
 class SensorSaturation(AbstractSensor):

@@ -20,6 +20,7 @@ from .innovation_products import part_length
 from .innovations import FilteredRuns, filter_runs, forces_at_ends
 from .open_loop import open_loop_errors
 from .output_error import concentrated_sigma, errors, negative_log_likelihood, residual_outputs
+from .readings import by_readings
 from .run_shares import by_share, joined, share_of, shares
 from .sensitivity import Jacobians, Linearised, force_columns, jacobians, linearise_runs, propagate
 from .smoother import smoothed
@@ -34,6 +35,7 @@ __all__ = [
     "Linearised",
     "Response",
     "System",
+    "by_readings",
     "by_share",
     "carried",
     "concentrated_sigma",

@@ -10,21 +10,23 @@ against, so that innovations and columns are independent where the model is righ
 Source: Åström (1980), Automatica 16, prediction errors.
 """
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.linalg import block_diag, cho_solve
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ..arrays import Values, namespace
-from ..effects import AbstractSensor
 from ..programs import compiled
 from ..recording.runs import Runs
 from ..simulation import Sampled
 from ..vehicle import AbstractVehicle
 from ..vehicle.base import wrapped
 from .disturbance import Columns, Disturbance, System, augmented, padded_width, total_products
+from .readings import as_if_prompt, by_readings, readings_of
 from .run_shares import by_share, joined, share_of
 from .sensitivity import Jacobians, jacobians
 
@@ -39,6 +41,7 @@ class FilteredRuns(eqx.Module):
     - `system`: linearised, steps at the filtered and outputs at the expected states.
     - `residual`: one column, the measured outputs less those expected, and the filter's corrections of the path.
     - `theta`: p columns, by the free parameters.
+    - `readings`: (R, K, c) which sample's reading shows each sample, -1 for none (`readings_of`).
     - `products`: (w, w) of the residual and `theta`, whitened under the disturbance, and zeros up to the width w of a
       program; `log_determinant`: half that of the residual's covariance.
     """
@@ -49,6 +52,7 @@ class FilteredRuns(eqx.Module):
     system: System
     residual: Columns
     theta: Columns
+    readings: Int[Array, "r k c"]
     products: Float[Array, "w w"]
     log_determinant: Float[Array, ""]
 
@@ -74,12 +78,12 @@ def filter_runs(
 
     own = lambda some: (vehicle, runs.share(some), sigma, disturbance, *share_of((start, begin), some), start_std)
     parts = by_share(_filtered_share, own, *runs.times.shape)
-    own = [(p.expected, p.filtered, p.force, p.system.by_run, p.residual, p.theta) for p in parts]
-    expected, filtered, force, system, residual, theta = joined(own, len(start))
+    own = [(p.expected, p.filtered, p.force, p.system.by_run, p.residual, p.theta, p.readings) for p in parts]
+    expected, filtered, force, system, residual, theta, readings = joined(own, len(start))
     products = jax.device_put(sum(np.asarray(p.products) for p in parts))
     log_determinant = jax.device_put(sum(np.asarray(p.log_determinant) for p in parts))
     system = System(*system, start_std)
-    return FilteredRuns(expected, filtered, force, system, residual, theta, products, log_determinant)
+    return FilteredRuns(expected, filtered, force, system, residual, theta, readings, products, log_determinant)
 
 
 def _filtered_share(
@@ -92,12 +96,15 @@ def _filtered_share(
     start_std: Array,
 ) -> FilteredRuns:
     """`filter_runs` of a share of the runs, at once."""
-    expected, filtered, force, push = _path(vehicle, runs, sigma, disturbance, start, begin)
+    readings = readings_of(vehicle, runs)
+    expected, filtered, force, push = _path(*as_if_prompt(vehicle, runs, readings), sigma, disturbance, start, begin)
     by = jacobians(vehicle, runs, filtered, expected, push)
-    system, residual, theta, whole = _columns(vehicle.turning, runs, sigma, start_std, expected, filtered, push, by)
+    readings = jax.device_put(readings)
+    own = vehicle.turning, runs, sigma, start_std, readings
+    system, residual, theta, whole = _columns(*own, expected, filtered, push, by)
     # waited for, so that no more shares than cores are in memory
     products, log_determinant = jax.block_until_ready(total_products(disturbance, system, whole))
-    return FilteredRuns(expected, filtered, force, system, residual, theta, products, log_determinant)
+    return FilteredRuns(expected, filtered, force, system, residual, theta, readings, products, log_determinant)
 
 
 @compiled
@@ -106,13 +113,16 @@ def _columns(
     runs: Runs,
     sigma: Array,
     start_std: Array,
+    readings: Array,
     expected: Array,
     filtered: Array,
     push: Array,
     by: Jacobians,
 ) -> tuple[System, Columns, Columns, Columns]:
     """The system along a path, the columns of the residual and of the free parameters, and both, padded."""
-    error = wrapped(turning, runs.outputs - by.shown)
+    error = by_readings(wrapped(turning, runs.outputs - by.shown), readings)
+    by = dataclasses.replace(by, C=by_readings(by.C, readings), direct=by_readings(by.direct, readings))
+    runs = dataclasses.replace(runs, mask=by_readings(runs.mask, readings).astype(bool))
     # the path was led by its corrections and by the force; a free path from the expected state would not have been
     led = jnp.einsum("rkst,rkt->rks", by.A, (filtered - expected)[:, :-1])
     led += jnp.einsum("rksn,rkn->rks", by.G, push.reshape(*push.shape[:2], -1))
@@ -128,7 +138,6 @@ def _path(
     vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbance: Disturbance, start: Array, begin: Values
 ) -> tuple[Float[Array, "r k s"], Float[Array, "r k s"], Float[Array, "r k n"], Float[Array, "r k1 2 n"]]:
     """Expected and filtered states, filtered forces, and the force at both ends of each interval."""
-    vehicle, outputs = _prompt(vehicle, runs)
     sampled = Sampled.of(vehicle, runs)
     nodes = jax.vmap(vehicle.actuate)(runs.times, runs.nodes())
     s, n = start.shape[1], len(disturbance.force)
@@ -171,7 +180,7 @@ def _path(
         P = block_diag(begin, jnp.diag(disturbance.force**2))
         return jax.lax.scan(advance, (m, P), (seen, moving))[1]
 
-    seen = (runs.times, runs.signals, outputs, runs.mask)
+    seen = (runs.times, runs.signals, runs.outputs, runs.mask)
     expected, filtered = jax.vmap(run)(start, jnp.asarray(begin), *seen, nodes, runs.step_of, runs.live)
     force = filtered[..., s:]
     push = forces_at_ends(force, runs.steps[runs.step_of], disturbance.time)
@@ -185,14 +194,3 @@ def forces_at_ends(
     xp = namespace(force, steps)
     kept = xp.exp(-steps[..., None] / time) * force[:, :-1]
     return xp.stack([force[:, :-1], kept], axis=2)
-
-
-def _prompt(vehicle: AbstractVehicle, runs: Runs) -> tuple[AbstractVehicle, Float[Array, "r k c"]]:
-    """A vehicle without sensors that show the past, which a filter does not keep, and outputs as if it had none."""
-    outputs = runs.outputs
-    for effect in vehicle.effects:
-        if isinstance(effect, AbstractSensor) and effect.remembers:
-            column = vehicle.layout.channels.index(effect.channel)
-            outputs = outputs.at[..., column].set(jax.vmap(effect.undone)(runs.times, outputs[..., column]))
-            vehicle = vehicle.without_effect(effect.label)
-    return vehicle, outputs

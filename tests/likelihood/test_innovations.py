@@ -15,6 +15,7 @@ from rigs import oscillator, recorded
 from jaxsub.effects.hull_damping import QuadraticDamping
 from jaxsub.effects.sensor_response import SensorDelay
 from jaxsub.likelihood import Columns, Disturbance, filter_runs, smoothed, whitened
+from jaxsub.likelihood.readings import readings_of
 from jaxsub.parameters import number
 from jaxsub.simulation import Sampled
 
@@ -98,12 +99,37 @@ def test_a_nonlinear_model_is_followed_where_a_free_run_goes_astray():
     assert away(followed.expected) < 0.1 * away(free)
 
 
-def test_a_late_sensor_is_followed_as_well_as_a_prompt_one(runs):
-    late = oscillator().with_effect(SensorDelay("x", number(0.2)))
-    delayed = recorded(late, 2, 60, 0.1, seed=3, amplitude=1.0)
-    white = lambda vehicle: whitened(DISTURBANCE, led(vehicle, delayed).system, led(vehicle, delayed).residual)[0]
-    rms = lambda vehicle: float(jnp.sqrt(jnp.mean(white(vehicle)[:, 5:-5] ** 2)))
-    assert rms(late) < 0.7 * rms(oscillator())
+def test_a_late_sensor_is_a_prompt_one_with_its_readings_moved_back(runs):
+    """Claim: the likelihood of a sensor three samples late is that of a prompt one, its readings three samples earlier.
+
+    Under a force that changes as fast as the delay, and with missing readings.
+    """
+    late = oscillator().with_effect(SensorDelay("x", number(0.3)))
+    moved = lambda array: jnp.concatenate([array[:, 3:, :1], jnp.zeros_like(array[:, :3, :1])], axis=1)
+    earlier = lambda array: jnp.concatenate([moved(array), array[..., 1:]], axis=2)
+    prompt = dataclasses.replace(runs, outputs=earlier(runs.outputs), mask=earlier(runs.mask))
+    found, expected = led(late, runs), led(oscillator(), prompt)
+    p = len(oscillator().layout.free)
+    np.testing.assert_array_equal(found.system.measured, prompt.mask)
+    np.testing.assert_allclose(found.expected, expected.expected, atol=1e-12)
+    np.testing.assert_allclose(found.residual.shown, expected.residual.shown, atol=1e-9)
+    np.testing.assert_allclose(found.products[: 1 + p, : 1 + p], expected.products[: 1 + p, : 1 + p], rtol=1e-9)
+    np.testing.assert_allclose(found.log_determinant, expected.log_determinant, rtol=1e-12)
+
+
+def test_readings_show_the_sample_that_is_their_delay_before():
+    """Claim: at uneven times a reading stands at the first sample that is not before what it shows, and at no other."""
+    times = np.cumsum(np.random.default_rng(4).uniform(0.05, 0.3, (2, 60)), axis=1)
+    runs = dataclasses.replace(recorded(oscillator(), 2, 60, 0.1, seed=3), times=jnp.asarray(times))
+    found = readings_of(oscillator().with_effect(SensorDelay("x", number(0.37))), runs)
+    np.testing.assert_array_equal(found[..., 1], np.tile(np.arange(60), (2, 1)))
+    for own, at in zip(found[..., 0], times, strict=True):
+        there = np.flatnonzero(own >= 0)
+        shown = at[own[there]] - 0.37
+        assert np.all(shown <= at[there] + 1e-6)
+        assert np.all(shown[there > 0] > at[there[there > 0] - 1])
+        # of a few samples that the same reading would follow the first has it, and the last ones have none
+        assert len(set(own[there])) == len(there) > 40 and there[-1] < 59
 
 
 def test_the_smoothed_force_and_start_are_the_dense_posterior(runs):

@@ -26,7 +26,7 @@ from ...effects import (
     with_memories,
     with_numbers,
 )
-from ...likelihood import Columns, padded_width
+from ...likelihood import Columns, by_readings, padded_width
 from ...programs import compiled
 from ...simulation import Trajectory
 from ...vehicle import AbstractVehicle
@@ -117,6 +117,7 @@ class EffectColumns:
         assert forcing is not None
         # by NumPy: to cut arrays of JAX would be a program for each place
         G, measured = np.asarray(system.G)[runs], np.asarray(system.measured)[runs]
+        readings = np.asarray(self.view.followed.readings)[runs]
         forces = [i for i, part in enumerate(self.parts) if part.is_force]
         for first in range(0, len(forces), _AT_ONCE):
             some = forces[first : first + _AT_ONCE]
@@ -126,7 +127,8 @@ class EffectColumns:
             forcing[..., some] = G @ np.concatenate([*ends], axis=2)
         for i, (at, value, step) in enumerate(self.parts):
             if not self.parts[i].is_force:
-                onto.shown[..., at, i] = np.where(measured[..., at], value[runs] / sigma[at], 0.0)
+                shown = by_readings(value[runs], readings[..., at]) / sigma[at]
+                onto.shown[..., at, i] = np.where(measured[..., at], shown, 0.0)
             if step is not None:
                 # numbers that differ by run may be states after the vehicle's own
                 forcing[:, :, : step.shape[-1], i] = step[runs]
