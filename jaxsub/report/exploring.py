@@ -71,8 +71,7 @@ class Drawing:
 
         for key, value in values.items():
             # seconds since 1970 need more digits
-            precise = not isinstance(value, np.ndarray) or key == "time"
-            kept = value if precise else single(value)
+            kept = single(value) if isinstance(value, np.ndarray) and key != "time" else value
             # plain, so that no name is read as a formula
             self.store[f"{place}/{key}"] = PlainText(text=kept) if isinstance(kept, str) else kept
 
