@@ -28,6 +28,7 @@ from .explain.show import channel_quality, coefficients, estimates, replaced, ru
 from .explain.shown import shown_on
 from .explain.summary import summary
 from .explain.validation import beyond_noise
+from .linearise.priors import with_priors_of, with_wide_priors
 from .linearise.view import View, look
 from .propose.name import Named
 from .records.diagnosis import Candidate, Conclusions, ForceTrace, Location, Physics, Rival
@@ -70,19 +71,20 @@ def diagnose(
     """
     until = limited(progress, budget, stop)
     progress("fitting the baseline")
-    start = fit(vehicle, batch(vehicle, train).padded())
+    file = with_wide_priors(vehicle)
+    start = fit(file, batch(file, train).padded())
     if RESULTS[start.result] == RESULTS[RESULTS.nan_start]:
         remedy = "give coefficients that are closer, or a bound on the one that makes it unstable"
         raise InputError(vehicle.layout.name, "the model does not run from its starting values", remedy)
     progress("following the recordings")
-    view = look(start, near=vehicle)
+    view = look(start, near=file)
     if not view.finite:
         remedy = "bound the coefficient that makes it unstable, or sample more often"
         raise InputError(vehicle.layout.name, "the model diverges in a filter of the recordings", remedy)
     found = examine(view, vocabulary, progress)
     signals = noise_signals(start, train)
     field = Field(shares(found.view, found.naming.first), traces(found.view, train), signals)
-    fitter, baseline = ModelFitter(until, vehicle), fitted_model(start, found.view, ())
+    fitter, baseline = ModelFitter(until, file), fitted_model(start, found.view, ())
     account = _Account(vehicle, train, found, field, baseline)
     so_far = lambda model, judged: keep(*account.of(model, model, judged, ()))
     named, judged, left = search_structure(fitter, baseline, found, vocabulary, so_far, begin)
@@ -161,13 +163,13 @@ class _Account:
             remains={} if shown is None else shown.remains,
             gain=None if shown is None else shown.gain,
             history=[] if shown is None else shown.history(sigma),
-            explanations=_explanations(judged, improved.vehicle),
+            explanations=tuple(with_priors_of(vehicle, one) for one in _explanations(judged, improved.vehicle)),
             explained=found,
             findings=_findings(vehicle, [*train, *test]),
             decisions=judged.decisions,
             complete=judged.complete,
         )
-        return diagnosis, improved.vehicle
+        return diagnosis, with_priors_of(vehicle, improved.vehicle)
 
     def _remaining(self, best: Model) -> list[ForceTrace]:
         """What the best model lacks, and what its effects are; what the baseline lacks where it is the best."""

@@ -127,6 +127,12 @@ class Solution(AbstractSearchEnd):
     estimated_spreads: tuple[str, ...] = eqx.field(static=True, default=(), kw_only=True)
 
     @property
+    def at_optimum(self) -> bool:
+        """Whether the search ended at an optimum, or its steps ran out within a standard error of one."""
+        out_of_steps = RESULTS[self.result] == RESULTS[RESULTS.nonlinear_max_steps_reached]
+        return self.converged or (out_of_steps and float(self.gradient_norm) < 1.0)
+
+    @property
     def at_bound(self) -> dict[str, str]:
         """Of each parameter that presses on a bound, which: `lower` or `upper`."""
         sides = zip(self.names, np.asarray(self.pressed), strict=True)

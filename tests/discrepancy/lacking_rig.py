@@ -6,6 +6,7 @@ import numpy as np
 from rigs import driven, oscillator
 
 from jaxsub.discrepancy.accept.acceptance import CandidateModels, Examination, Model, ModelFitter, fitted_model
+from jaxsub.discrepancy.linearise.priors import with_wide_priors
 from jaxsub.discrepancy.linearise.view import look
 from jaxsub.discrepancy.search.examine import listed, weighed
 from jaxsub.effects import AbstractEffect, CoulombFriction, CubicDamping, CubicStiffness, QuadraticDamping, SensorScale
@@ -14,7 +15,8 @@ from jaxsub.simulation import synthetic
 
 KINDS = (CoulombFriction, CubicDamping, CubicStiffness, QuadraticDamping, SensorScale)
 DRAG, CUBIC, SPRING = "quadratic-damping[x]", "cubic-damping[x]", "cubic-stiffness[x]"
-FITTER = ModelFitter(lambda message: None, oscillator())
+FILE = with_wide_priors(oscillator())
+FITTER = ModelFitter(lambda message: None, FILE)
 
 
 @cache
@@ -23,7 +25,7 @@ def lacking(drag: float, spring: float = 0.0) -> tuple[Model, Examination]:
     truth = oscillator().with_effect(QuadraticDamping("x", drag))
     truth = truth.with_effect(CubicStiffness("x", spring)) if spring else truth
     inputs = [driven(truth, 0.1 * np.arange(200), seed, amplitude=1.0) for seed in range(2)]
-    found = fit(oscillator(), batch(oscillator(), synthetic(truth, inputs, seed=4)))
+    found = fit(FILE, batch(FILE, synthetic(truth, inputs, seed=4)))
     view = look(found)
     return fitted_model(found, view, ()), weighed(view, listed(view, KINDS), lambda message: None)
 

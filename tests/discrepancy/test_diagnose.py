@@ -73,8 +73,9 @@ def test_the_improved_vehicle_file_leaves_nothing_out(effect):
 
 
 def test_nothing_concealed_is_none():
-    """Claim: clean runs have no mismatch, in no place, and nothing is fitted to them."""
-    found, _ = run(None)
+    """Claim: clean runs have no mismatch, in no place, nothing is fitted to them, and the file's priors are its own."""
+    found, improved = run(None)
+    assert [row.prior_std for row in improved.layout.free] == [row.prior_std for row in wrong().layout.free]
     assert (found.verdict, found.physics, found.where) == ("none", [], [])
     assert found.p_value > 0.01
     assert found.fit["held_out"]["baseline"] == found.fit["held_out"]["improved"]

@@ -13,7 +13,7 @@ from jaxsub.discrepancy.accept.cross_validation import Predicted, one_step_ahead
 from jaxsub.discrepancy.accept.restarts import restarted
 from jaxsub.discrepancy.explain.evaluation import evaluated
 from jaxsub.discrepancy.linearise.evidence import evidence_of
-from jaxsub.discrepancy.linearise.innovation_search import InnovationSearch, with_wide_priors
+from jaxsub.discrepancy.linearise.innovation_search import InnovationSearch
 from jaxsub.discrepancy.linearise.view import led_from
 from jaxsub.discrepancy.propose.name import Named
 from jaxsub.discrepancy.search.examine import listed
@@ -117,7 +117,7 @@ def test_a_view_that_lacks_an_effect_is_that_of_the_vehicle_without_it():
     view = led_from(vehicle, runs, SIGMA, [dataclasses.replace(STILL, force=jnp.array([1.0]))])
     effect = view.vehicle.effects[-1]
     fewer = selector_without(listed(view, None, present=True), effect).evidence.view
-    problem = with_wide_priors(Problem.of(fewer.vehicle, runs, SIGMA))
+    problem = Problem.of(fewer.vehicle, runs, SIGMA)
     anew = InnovationSearch(problem, problem.guess).evaluate(fewer.vehicle, view.disturbance)
     before, there, expected = (squares(one) for one in (view, fewer, anew))
     assert abs(numbers(effect)["coefficient"]) > 1e-4

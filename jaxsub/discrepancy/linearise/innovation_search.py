@@ -18,7 +18,6 @@ from ...estimate import Problem, by_cost, estimate_disturbance
 from ...likelihood import Columns, Disturbance, FilteredRuns, filter_runs, smoothed
 from ...vehicle import AbstractVehicle
 from ...vehicle.layout import Layout
-from .. import settings
 
 # dampings of a scoring step, of a column's squares, and shares of a change of the disturbance, tried in this order
 _DAMPINGS, _SHARES = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1), (1.0, 0.5)
@@ -234,14 +233,6 @@ def _promised(gram: np.ndarray, step: np.ndarray) -> float:
 def root_or_one(squares: Float[np.ndarray, " q"]) -> Float[np.ndarray, " q"]:
     """Lengths of columns by their squares; one for an empty column."""
     return np.where(squares > 0.0, np.sqrt(np.maximum(squares, 0.0)), 1.0)
-
-
-def with_wide_priors(problem: Problem) -> Problem:
-    """A problem with a wide prior about each number of the file that has none."""
-    vehicle, own = problem.vehicle, problem.vehicle.own_values()
-    width, given = settings.PRIOR_WIDTH * np.abs(problem.prior_mean), [row.name in own for row in vehicle.layout.free]
-    wide = np.array(given, bool) & (width > 0.0) & np.isinf(problem.prior_std)
-    return dataclasses.replace(problem, prior_std=jax.device_put(np.where(wide, width, problem.prior_std)))
 
 
 def distinct(found: Iterable[Iterate]) -> list[Iterate]:

@@ -30,7 +30,7 @@ from ...recording.runs import Runs
 from ...simulation import Trajectory
 from ...vehicle import AbstractVehicle, numbers_that_may_vary, quantities_of
 from .. import settings
-from .innovation_search import InnovationSearch, Iterate, distinct, fitted_states, left_over, with_wide_priors
+from .innovation_search import InnovationSearch, Iterate, distinct, fitted_states, left_over
 from .tones import tones
 from .whiteness import record_sigma
 
@@ -119,20 +119,20 @@ def look(fit: Solution, disturbance: Disturbance | None = None, near: AbstractVe
     where that is better.
 
     Where a fit leaves errors far above the noise, parameters start too from a vehicle that is `near`, such as that of
-    the file: a fit without the missing physics may be in an optimum that nothing leads out of. Its initial states are
-    not trusted either, and the filter begins at their prior. Without a disturbance given, the search is then a
-    multi-start one, whose better half goes on after each alternation: the misfit is first attributed to forces, or to
-    sensors, since forces that follow a faulty sensor bias all others. It ends along the path from the initial states
-    that all samples then show.
-
-    Parameters of the file have a wide prior. Without a velocity log, say, the recordings hardly identify some, and
-    values a hundred times too large could absorb an actuator's force.
+    the file: a fit without the missing physics may be in an optimum that nothing leads out of. They start from it alone
+    where the fit found no optimum. Its initial states are not trusted either, and the filter begins at their prior.
+    Without a disturbance given, the search is then a multi-start one, whose better half goes on after each alternation:
+    the misfit is first attributed to forces, or to sensors, since forces that follow a faulty sensor bias all others.
+    It ends along the path from the initial states that all samples then show.
     """
-    problem, rms = with_wide_priors(fit.problem), fit.rms
+    problem, rms = fit.problem, fit.rms
     much = max(rms.values()) > settings.LARGE_ERROR
     search = InnovationSearch(problem, problem.guess) if much else InnovationSearch(problem, *_trusted(fit))
     guess = dataclasses.replace(guessed(fit), noise=_white(fit))
-    vehicles = [fit.vehicle, *([near] if much and near is not None else [])]
+    vehicles = [fit.vehicle]
+    if much and near is not None:
+        # where no optimum was found, a search may have led anywhere
+        vehicles = [fit.vehicle, near] if fit.at_optimum else [near]
     best = lambda pairs: by_cost(search.evaluate(*pair) for pair in pairs)[0]
     if disturbance is not None:
         iterates = [best([(v, start) for v in vehicles for start in (guess, disturbance)])]
@@ -156,7 +156,7 @@ def led_from(vehicle: AbstractVehicle, runs: Runs, sigma: Array, disturbances: I
     converges, since the first steps are far from linear, and then along the path from the initial states that all
     samples show.
     """
-    problem = with_wide_priors(Problem.of(vehicle, runs, sigma))
+    problem = Problem.of(vehicle, runs, sigma)
     search = InnovationSearch(problem, problem.guess)
     found = search.maximised(by_cost(search.evaluate(vehicle, one) for one in disturbances)[0])
     return _view(search, search.from_smoothed(found, InnovationSearch.maximised))
