@@ -87,6 +87,10 @@ class Model(NamedTuple):
         """Whether moreover each added effect is significant beside the others (Wald test)."""
         return self.admissible and are_significant(self.view, self.added)
 
+    def p_value_of(self, effect: AbstractEffect) -> float:
+        """The p-value of one of its effects beside the others (Wald test), 1 where inadmissible."""
+        return p_value(self.view, effect) if is_admissible(self.fit, [effect]) else 1.0
+
 
 @dataclasses.dataclass(frozen=True)
 class ModelFitter:
@@ -168,15 +172,16 @@ class CandidateModels:
         return [vehicle]
 
     def is_significant(self, numbers: Sequence[int]) -> bool:
-        """Whether their model is admissible and each of them significant in it."""
-        return self.model(numbers).significant
+        """Whether each of them is admissible and significant in their model.
+
+        An effect of the base that is neither beside them is no reason against them: it was in their place.
+        """
+        return not self.insignificant(numbers)
 
     def insignificant(self, numbers: Sequence[int]) -> list[int]:
         """Those of a set that are inadmissible or insignificant in its fit, the largest p-value first."""
-        model, key = self.model(numbers), sorted(numbers)
-        own = dict(zip(key, model.added[len(model.added) - len(key) :], strict=True))
-        test = lambda effect: p_value(model.view, effect) if is_admissible(model.fit, [effect]) else 1.0
-        p_values = {i: test(effect) for i, effect in own.items()}
+        own = zip(sorted(numbers), self._own(numbers), strict=True)
+        p_values = {i: self.model(numbers).p_value_of(effect) for i, effect in own}
         return [i for i in sorted(p_values, key=lambda i: -p_values[i]) if not p_values[i] < settings.SIGNIFICANCE]
 
     def accepts(self, fewer: Sequence[int], more: int) -> bool:
@@ -193,8 +198,13 @@ class CandidateModels:
         key = tuple(sorted(numbers))
         if key not in self.values:
             model = self.model(key)
-            self.values[key] = evidence_of(model.view) if model.admissible else -np.inf
+            self.values[key] = evidence_of(model.view) if is_admissible(model.fit, self._own(key)) else -np.inf
         return self.values[key]
+
+    def _own(self, numbers: Sequence[int]) -> tuple[AbstractEffect, ...]:
+        """These candidates as effects of their model, in the order of their numbers, without those of the base."""
+        added = self.model(numbers).added
+        return added[len(added) - len(numbers) :]
 
     def alternatives(self, others: Sequence[int], index: int) -> Fits:
         """A candidate and those nearly collinear with it, each beside the `others`, by log evidence of their fits.

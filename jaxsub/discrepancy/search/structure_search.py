@@ -5,6 +5,7 @@ from collections.abc import Callable, Generator, Sequence
 
 from ...effects import AbstractEffect
 from ...errors import InputError
+from ...estimate import evaluate
 from .. import settings
 from ..accept.acceptance import Examination, Model, ModelFitter, accept_proposed, proposed_effects
 from ..accept.cross_validation import compare
@@ -66,7 +67,7 @@ def answers(
     best, judged, refusals = baseline, NOTHING, 0
     dropped: set[str] = set()
     # a simulation that cannot be fitted proposes nothing
-    searched = not baseline.fit.converged
+    searched = not evaluate(baseline.fit).at_optimum
     by_innovations = stepwise_by_innovations(fitter, baseline, vocabulary) if searched else None
     if begin and by_innovations is None:
         best, judged = warm_started(fitter, baseline, found, begin)
@@ -147,7 +148,8 @@ def without_redundant(
         fewer = fitter.with_effects(
             baseline, [e for e in best.fit.vehicle.all_effects if e.label in others], best.view.disturbance
         )
-        comparison = compare(fewer.predicted, best.predicted)
+        stands = best.p_value_of(effect) < settings.SIGNIFICANCE
+        comparison = compare(fewer.predicted, best.predicted, stands)
         if not comparison.accepted and fewer.significant:
             best, judged = fewer, without_effect(judged, effect.label, others, comparison)
     return best, judged
