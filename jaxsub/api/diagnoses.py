@@ -225,7 +225,8 @@ class Diagnosis(AbstractResult):
         return Table(heads, decision_rows(self.conclusions.decisions))
 
     def plot(self, name: str | None = None) -> "Picture":
-        """A figure of the report: `residual`, `forces`, `by-state`, `scan`, `before-after`, `checks`, `coefficients`.
+        """A figure of the report: `residual`, `forces`, `by-state`, `scan`, `before-after`, `checks`, `coefficients`,
+        `by-run`.
 
         Without a `name` it is the test run before and after, or the first there is.
 

@@ -348,14 +348,8 @@ class Fit(AbstractResult):
                 "tied": said.tied,
             },
             "coefficients": {e.name: _without_name(e) for e in self.estimates},
-            "by_run": {one.name: self._by_run(one) for one in self.variations},
+            "by_run": {one.name: one.to_json(self.runs) for one in self.variations},
         }
-
-    def _by_run(self, one: RunValues) -> dict[str, Any]:
-        spread = {"value": one.spread, "standard_error": one.spread_error, "estimated": one.estimated}
-        each = zip(self.runs, one.values, one.errors, strict=True)
-        runs = [{"run": run, "value": float(value), "standard_error": float(error)} for run, value, error in each]
-        return {"unit": one.unit, "spread": spread, "runs": runs}
 
     def write(self, folder: Path) -> None:
         """Write `fitted.toml`, `coefficients.csv` and `identification.json` into `folder`.

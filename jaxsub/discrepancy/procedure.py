@@ -130,6 +130,7 @@ class _Account:
         own = improved if named is best else with_coloured_errors(named.view, named.fit)
         physics = [_physics(one, own) for one in judged.named]
         given = [name for name, spread in vehicle.spreads.items() if float(spread) > 0.0]
+        by_run = improved.varying([name for name in improved.vehicle.spreads if name not in given])
         found = None if shown is None else shown.explained
         diagnosis = Conclusions(
             verdict=judged.verdict,
@@ -154,7 +155,7 @@ class _Account:
                 *_replaced_notes(start, improved),
                 *disturbance_note(best.view),
                 *noise_note(field.signals),
-                *(one.sentence() for one in improved.varying([n for n in improved.vehicle.spreads if n not in given])),
+                *(one.sentence() for one in by_run),
                 *([] if shown is None else beyond_noise(shown.left, shown.after.rms, layout)),
             ],
             next_manoeuvre=next_manoeuvre(judged.verdict, physics),
@@ -168,6 +169,7 @@ class _Account:
             findings=_findings(vehicle, [*train, *test]),
             decisions=judged.decisions,
             complete=judged.complete,
+            by_run=list(by_run),
         )
         return diagnosis, with_priors_of(vehicle, improved.vehicle)
 

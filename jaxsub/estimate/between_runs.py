@@ -8,6 +8,7 @@ $s^2 = \sum(\theta_r - \bar\theta)^2/(R-1)$. Source: Pinheiro and Bates (2000), 
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import jax
 import numpy as np
@@ -50,6 +51,13 @@ class RunValues:
     spread_error: float | None
     values: np.ndarray
     errors: np.ndarray
+
+    def to_json(self, runs: Sequence[str]) -> dict[str, Any]:
+        """As files have it, the `runs` by name."""
+        spread = {"value": self.spread, "standard_error": self.spread_error, "estimated": self.estimated}
+        each = zip(runs, self.values, self.errors, strict=True)
+        own = [{"run": run, "value": float(value), "standard_error": float(error)} for run, value, error in each]
+        return {"unit": self.unit, "spread": spread, "runs": own}
 
     def sentence(self) -> str:
         """What differs, and by how much."""

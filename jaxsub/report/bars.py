@@ -1,15 +1,16 @@
-"""The two figures that rank: the score scan, and how far the coefficients moved."""
+"""Figures that list numbers: the score scan, how far coefficients moved, and what differs by run."""
 
 import math
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullLocator
 
 from ..discrepancy.records.diagnosis import Candidate, Coefficient, Conclusions
 from .drawing import GREY, IMPROVED, LOCATED, PALE, Picture, drawable, new_figure, png
-from .text import number, plain_label, power_of_ten
+from .text import number, plain_label, power_of_ten, unit
 
 MOST_CANDIDATES = 12
 _MOST_COEFFICIENTS = 20
@@ -84,6 +85,23 @@ def draw_coefficients(diagnosis: Conclusions) -> Picture | None:
     ]
     figure.legend(handles=handles, loc="outside lower left", ncols=2)
     return Picture("coefficients", "How far each coefficient moved when the effects were added", png(figure))
+
+
+def draw_by_run(diagnosis: Conclusions) -> Picture | None:
+    """Each number that differs by run with its standard error, over the training runs; None when there is none."""
+    if not diagnosis.by_run:
+        return None
+    figure = new_figure(_WIDTH, 1.6 * len(diagnosis.by_run) + 0.6)
+    every = np.atleast_1d(figure.subplots(len(diagnosis.by_run), sharex=True))
+    for axes, one in zip(every, diagnosis.by_run, strict=True):
+        at = np.arange(1, len(one.values) + 1)
+        axes.errorbar(at, one.values, yerr=2.0 * one.errors, fmt="o", color=IMPROVED, markersize=3, linewidth=1.0)
+        axes.axhline(float(np.mean(one.values)), color=GREY, linewidth=0.7)
+        axes.set_title(drawable(f"{one.name} ({unit(one.unit)})" if one.unit else one.name, 60), loc="left")
+        axes.ticklabel_format(axis="y", useOffset=False)
+    every[-1].xaxis.set_major_locator(MaxNLocator(integer=True))
+    every[-1].set_xlabel("training run, in order; ± 2 standard errors")
+    return Picture("by-run", "Numbers that differ by run, over the training runs", png(figure))
 
 
 def _rows(axes: Axes, labels: list[str]) -> None:

@@ -7,11 +7,14 @@ from html.parser import HTMLParser
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pytest
 from report_examples import VEHICLE, bare, diagnosis
 from report_traces import CHANNELS, COEFFICIENTS
 
 from jaxsub.discrepancy.records.diagnosis import Rival
+from jaxsub.discrepancy.records.stored import load_conclusions, save_conclusions
+from jaxsub.estimate import RunValues
 from jaxsub.report import draw
 from jaxsub.report.page import TITLE, render
 from jaxsub.report.text import plain_label
@@ -123,6 +126,24 @@ def test_the_kind_of_mismatch_is_said():
     assert "by the accepted effects and their rivals" in text
     assert "before anything is named" in render(diagnosis("unknown"), VEHICLE, {})
     assert "What kind" not in render(bare(), VEHICLE, {})
+
+
+def test_what_differs_by_run_has_a_table_and_a_picture(tmp_path):
+    """Claim: each training run's own value stands with its error beside the run, in the page, the file, as stored."""
+    drift = RunValues("buoyancy", "N", 0.085, True, 0.03, np.array([510.1, 509.6]), np.array([0.02, 0.0123]))
+    made = dataclasses.replace(diagnosis("named"), by_run=[drift])
+    save_conclusions(made, tmp_path / "diagnosis.npz")
+    for one in (made, load_conclusions(tmp_path / "diagnosis.npz")):
+        pictures = draw(one)
+        assert "by-run" in pictures and "by-run" not in draw(diagnosis("none"))
+        text = render(one, VEHICLE, pictures)
+        outline = Outline(text)
+        assert "by-run" in outline.ids
+        assert re.search(r"zigzag-2</th><td class=\"n\">509.600 ± 0.012", text)
+    (told,) = made.to_json()["by_run"].values()
+    assert told["spread"] == {"value": 0.085, "standard_error": 0.03, "estimated": True}
+    assert [run["run"] for run in told["runs"]] == ["turns-1", "zigzag-2"]
+    assert [run["value"] for run in told["runs"]] == [510.1, 509.6]
 
 
 def test_a_noise_that_nobody_stated_is_no_wrong_one():

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...estimate import RunValues
 from ...findings import Finding
 from ...vehicle import AbstractVehicle
 from .decisions import Decision
@@ -252,7 +253,8 @@ class Conclusions:
     which may be random forces and noise alone (`disturbance`). `file_p_value` is how probable the numbers found are
     where those of the vehicle file are right. `explained` is what the effects remove of the test runs' error, and
     `findings` is what reading and checking the recordings found, and `decisions` are all choices in order. It is
-    `complete` unless its time was spent before all was tried.
+    `complete` unless its time was spent before all was tried. `by_run` are the improved model's numbers that differ by
+    run, with values in the order of the training runs.
     """
 
     verdict: Verdict
@@ -281,11 +283,17 @@ class Conclusions:
     findings: tuple[Finding, ...] = ()
     decisions: Sequence[Decision] = ()
     complete: bool = True
+    by_run: list[RunValues] = dataclasses.field(default_factory=list)
 
     @property
     def improves(self) -> bool:
         """Whether the improved model is another than the baseline: an effect was named, or a surrogate added."""
         return len(self.history) > 1
+
+    @property
+    def training_runs(self) -> list[str]:
+        """Their names, in order."""
+        return [run.name for run in self.runs if run.role == "train"]
 
     @property
     def quality(self) -> dict[str, ChannelQuality]:
@@ -330,6 +338,7 @@ class Conclusions:
                 "where": where,
             },
             "physics": physics,
+            "by_run": {one.name: one.to_json(self.training_runs) for one in self.by_run},
             "fit": self.fit,
             "held_out_checks": {
                 model: {channel: one.to_json() for channel, one in left.items()} for model, left in self.remains.items()
