@@ -14,6 +14,7 @@ from jaxsub.discrepancy.accept.restarts import restarted
 from jaxsub.discrepancy.explain.evaluation import evaluated
 from jaxsub.discrepancy.linearise.evidence import evidence_of
 from jaxsub.discrepancy.linearise.innovation_search import InnovationSearch
+from jaxsub.discrepancy.linearise.priors import with_wide_priors
 from jaxsub.discrepancy.linearise.view import led_from
 from jaxsub.discrepancy.propose.name import Named
 from jaxsub.discrepancy.search.examine import listed
@@ -34,12 +35,11 @@ STILL = Disturbance(jnp.array([1e-3]), jnp.array([1.0]), jnp.ones(2))
 
 
 def pendulum(**values):
-    """One that falls over by itself, as its file has it or with other numbers."""
+    """One that falls over by itself, as its file has it or with other numbers, under the priors of a diagnosis."""
     coefficients = {"I_x": {"value": 1.0, "fixed": True}, "D_x": 0.3, "K_x": -1.0, "B_x_drive": 2.0}
     outputs = {"x": {"sigma": 0.005}, "x_rate": {"sigma": 0.01}}
-    return oscillator(coefficients=coefficients, outputs=outputs).with_values(
-        {k: jnp.asarray(v) for k, v in values.items()}
-    )
+    vehicle = with_wide_priors(oscillator(coefficients=coefficients, outputs=outputs))
+    return vehicle.with_values({k: jnp.asarray(v) for k, v in values.items()})
 
 
 @cache
