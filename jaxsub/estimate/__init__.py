@@ -16,7 +16,7 @@ from .methods import METHODS, ekf, gauss_newton, gradient, mekf, nelder_mead, ne
 from .path_disturbance import disturbance_along
 from .posterior_draws import posterior
 from .problem import Problem, require_free
-from .restarted_searches import race, with_estimated_spreads
+from .restarted_searches import continued, race, with_estimated_spreads
 from .search_ends import Ends, ends
 from .starts import Basin, Rate, basins, scattered, success
 
@@ -51,6 +51,7 @@ __all__ = [
     "by_cost",
     "channel_noise",
     "channel_rms",
+    "continued",
     "disturbance_along",
     "ekf",
     "ends",

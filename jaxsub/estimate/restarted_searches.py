@@ -33,6 +33,16 @@ def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " 
     return SearchEnd(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
 
 
+def continued(ended: AbstractSearchEnd) -> SearchEnd:
+    """The search on from the numbers and the initial states where it `ended`, or where another kind of search did.
+
+    From the guess of its initial states alone the simulation of an unstable vehicle leads nowhere.
+    """
+    problem = Problem.of(ended.vehicle, ended.runs, ended.sigma)
+    y = problem.coordinates_of(ended.vehicle, ended.start)
+    return concentrated(problem, y, np.zeros(len(ended.sigma), bool), ())
+
+
 def with_estimated_spreads(ended: AbstractSearchEnd, names: Sequence[str]) -> SearchEnd:
     """The search on from where it `ended`, the standard deviations between runs of the numbers `names` open."""
     problem = Problem.of(ended.vehicle, ended.runs, ended.sigma)

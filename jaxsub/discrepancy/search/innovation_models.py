@@ -13,14 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...effects import AbstractEffect, RunVariation
-from ...estimate import SearchEnd, evaluate, initial_guess, substeps_for
+from ...estimate import SearchEnd, continued, evaluate, substeps_for
 from ...likelihood import Disturbance, concentrated_sigma, residual_outputs
 from ...results import SUCCESSFUL
 from ...vehicle import AbstractVehicle
 from .. import settings
 from ..accept.acceptance import Model, ModelFitter, fitted_model
 from ..accept.cross_validation import Comparison, compare, one_step_ahead, simulated
-from ..accept.model import amplitude_indices, refit, with_scaled_effects, without_variation
+from ..accept.model import amplitude_indices, with_scaled_effects, without_variation
 from ..accept.restarts import restarted, starts
 from ..linearise.evidence import evidence_of
 from ..linearise.view import View, led_from, look
@@ -73,7 +73,7 @@ class InnovationModels:
         return compare(fewer, best.predicted)
 
     def _model(self, model: Model, view: View, effects: Sequence[AbstractEffect]) -> Model:
-        start, _ = initial_guess(view.vehicle, view.runs)
+        start = view.followed.expected[:, 0]
         cost = jnp.asarray(-evidence_of(view))
         ended = SearchEnd(view.vehicle, view.runs, start, view.sigma, cost, jnp.asarray(0), SUCCESSFUL)
         predicted = model.predicted._replace(one_step=one_step_ahead(view))
@@ -126,7 +126,7 @@ def validated_in_simulation(fitter: ModelFitter, base: Model, best: Model) -> Mo
     if pieces > 1:
         before, after = (segmented(model, pieces) for model in (base, best))
     else:
-        fit = refit(best.fit, best.view.vehicle)
+        fit = evaluate(continued(best.fit))
         view = look(fit, best.view.disturbance)
         after = fitted_model(fit, view, best.added)
     return after if compare(before.predicted, after.predicted, after.significant).accepted else None
