@@ -10,6 +10,7 @@ from ..recording.runs import Runs
 from ..vehicle import AbstractVehicle
 from .blockwise import Descent, raced
 from .fitting import AbstractSearchEnd, SearchEnd, concentrated
+from .method import AbstractMethod
 from .methods import gauss_newton
 from .problem import Problem
 
@@ -33,19 +34,17 @@ def race(vehicles: Sequence[AbstractVehicle], runs: Runs, sigma: Float[Array, " 
     return SearchEnd(fitted, runs, states, best.problem.sigma, found.cost, found.evaluations, found.result)
 
 
-def continued(ended: AbstractSearchEnd) -> SearchEnd:
+def continued(ended: AbstractSearchEnd, spreads: Sequence[str] = (), method: AbstractMethod | None = None) -> SearchEnd:
     """The search on from the numbers and the initial states where it `ended`, or where another kind of search did.
 
-    From the guess of its initial states alone the simulation of an unstable vehicle leads nowhere.
+    From the guess of its initial states alone the simulation of an unstable vehicle leads nowhere. The standard
+    deviations between runs of the numbers `spreads` are open. `method` is Gauss–Newton where none is given.
     """
     problem = Problem.of(ended.vehicle, ended.runs, ended.sigma)
     y = problem.coordinates_of(ended.vehicle, ended.start)
-    return concentrated(problem, y, np.zeros(len(ended.sigma), bool), ())
+    return concentrated(problem, y, np.zeros(len(ended.sigma), bool), tuple(spreads), method)
 
 
 def with_estimated_spreads(ended: AbstractSearchEnd, names: Sequence[str]) -> SearchEnd:
     """The search on from where it `ended`, the standard deviations between runs of the numbers `names` open."""
-    problem = Problem.of(ended.vehicle, ended.runs, ended.sigma)
-    y = problem.coordinates_of(ended.vehicle, ended.start)
-    method = dataclasses.replace(gauss_newton(), max_steps=_PASSES)
-    return concentrated(problem, y, np.zeros(len(ended.sigma), bool), tuple(names), method)
+    return continued(ended, names, dataclasses.replace(gauss_newton(), max_steps=_PASSES))

@@ -97,10 +97,11 @@ def _filtered_share(
 ) -> FilteredRuns:
     """`filter_runs` of a share of the runs, at once."""
     readings = readings_of(vehicle, runs)
-    expected, filtered, force, push = _path(*as_if_prompt(vehicle, runs, readings), sigma, disturbance, start, begin)
+    prompt, moved = as_if_prompt(vehicle, runs, readings)
+    expected, filtered, force, push = _path(prompt, moved, sigma, disturbance, start, begin)
     by = jacobians(vehicle, runs, filtered, expected, push)
     readings = jax.device_put(readings)
-    own = vehicle.turning, runs, sigma, start_std, readings
+    own = vehicle.turning, runs, moved.mask, sigma, start_std, readings
     system, residual, theta, whole = _columns(*own, expected, filtered, push, by)
     # waited for, so that no more shares than cores are in memory
     products, log_determinant = jax.block_until_ready(total_products(disturbance, system, whole))
@@ -111,6 +112,7 @@ def _filtered_share(
 def _columns(
     turning: tuple[bool, ...],
     runs: Runs,
+    measured: Array,
     sigma: Array,
     start_std: Array,
     readings: Array,
@@ -119,10 +121,13 @@ def _columns(
     push: Array,
     by: Jacobians,
 ) -> tuple[System, Columns, Columns, Columns]:
-    """The system along a path, the columns of the residual and of the free parameters, and both, padded."""
+    """The system along a path, the columns of the residual and of the free parameters, and both, padded.
+
+    `measured` (R, K, c) is whether the reading that shows a sample was.
+    """
     error = by_readings(wrapped(turning, runs.outputs - by.shown), readings)
     by = dataclasses.replace(by, C=by_readings(by.C, readings), direct=by_readings(by.direct, readings))
-    runs = dataclasses.replace(runs, mask=by_readings(runs.mask, readings).astype(bool))
+    runs = dataclasses.replace(runs, mask=measured)
     # the path was led by its corrections and by the force; a free path from the expected state would not have been
     led = jnp.einsum("rkst,rkt->rks", by.A, (filtered - expected)[:, :-1])
     led += jnp.einsum("rksn,rkn->rks", by.G, push.reshape(*push.shape[:2], -1))

@@ -45,7 +45,7 @@ def as_if_prompt(
     Between readings and where they are missing what is shown is interpolated; a sample is measured where the one of the
     `readings` (R, K, c) is that shows it.
     """
-    late = [effect for effect in _sensors(vehicle) if effect.remembers]
+    late = _late(vehicle)
     if not late:
         return vehicle, runs
     times, outputs, mask = np.asarray(runs.times), np.array(runs.outputs), np.asarray(runs.mask)
@@ -56,7 +56,7 @@ def as_if_prompt(
             if there.any():
                 shown[:] = plain.undone(own, np.interp(own, own[there], shown[there]))
         vehicle = vehicle.without_effect(effect.label)
-    arrays = jax.device_put({"outputs": outputs, "mask": by_readings(mask, readings).astype(bool)})
+    arrays = jax.device_put({"outputs": outputs, "mask": by_readings(mask, readings)})
     return vehicle, dataclasses.replace(runs, **arrays)
 
 
@@ -64,18 +64,19 @@ def by_readings(rows: Values, readings: Int[Values, "r k c"]) -> Values:
     """The `rows` (R, K, c, …) of `readings` (R, K, c), each at the sample that it shows; zero where none shows one."""
     xp = namespace(rows, readings)
     wide = readings.reshape(*readings.shape, *[1] * (rows.ndim - 3))
-    return xp.where(wide >= 0, xp.take_along_axis(rows, xp.maximum(wide, 0), 1), 0)
+    return xp.where(wide >= 0, xp.take_along_axis(rows, xp.maximum(wide, 0), 1), xp.zeros((), rows.dtype))
 
 
 def _delays(vehicle: AbstractVehicle) -> dict[str, float]:
     """By channel how late its readings are, s, where they are."""
     found: dict[str, float] = {}
-    for effect in _sensors(vehicle):
+    for effect in _late(vehicle):
         if float(effect.delay) > 0.0:
             found[effect.channel] = found.get(effect.channel, 0.0) + float(effect.delay)
     return found
 
 
-def _sensors(vehicle: AbstractVehicle) -> list[AbstractSensor]:
-    """Effects on one output each."""
-    return [effect for effect in vehicle.effects if vehicle.shows(effect) and isinstance(effect, AbstractSensor)]
+def _late(vehicle: AbstractVehicle) -> list[AbstractSensor]:
+    """Effects on one output each that show the past."""
+    own = (effect for effect in vehicle.effects if vehicle.shows(effect) and isinstance(effect, AbstractSensor))
+    return [effect for effect in own if effect.remembers]

@@ -2,7 +2,7 @@
 
 import abc
 import dataclasses
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, Self, TypeGuard
 
 import equinox as eqx
@@ -25,7 +25,7 @@ from ..effects import (
     with_numbers,
 )
 from ..methods import jittable
-from ..parameters import number
+from ..parameters import Parameter, number
 from .description import described
 from .layout import Layout, deviation
 from .sensors.output import SPECIFIC_FORCE
@@ -213,8 +213,11 @@ class AbstractVehicle(eqx.Module):
 
     def with_freedom(self, free: Mapping[str, bool]) -> Self:
         """The same vehicle, the numbers that `free` names free or not; what it lacks of them is passed over."""
-        changed = lambda row: dataclasses.replace(row, free=free.get(row.name, row.free))
-        layout = dataclasses.replace(self.layout, parameters=tuple(map(changed, self.layout.parameters)))
+        return self.with_rows(lambda row: dataclasses.replace(row, free=free.get(row.name, row.free)))
+
+    def with_rows(self, change: Callable[[Parameter], Parameter]) -> Self:
+        """The same vehicle, each `Parameter` as `change` makes it."""
+        layout = dataclasses.replace(self.layout, parameters=tuple(map(change, self.layout.parameters)))
         return dataclasses.replace(self, layout=layout)
 
     def position_rates(self, motion: Motion) -> dict[str, Signal]:

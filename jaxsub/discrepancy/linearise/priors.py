@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
 
 from ...parameters import Parameter
 from ...vehicle import AbstractVehicle
@@ -22,15 +21,10 @@ def with_wide_priors(vehicle: AbstractVehicle) -> AbstractVehicle:
         wide = row.free and row.name in own and width > 0.0 and math.isinf(row.prior_std)
         return dataclasses.replace(row, prior_std=width) if wide else row
 
-    return _with_rows(vehicle, widened)
+    return vehicle.with_rows(widened)
 
 
 def with_priors_of(file: AbstractVehicle, vehicle: AbstractVehicle) -> AbstractVehicle:
     """A `vehicle` under the priors that its `file` states of the numbers that both have."""
     stated = {row.name: row.prior_std for row in file.layout.parameters}
-    return _with_rows(vehicle, lambda row: dataclasses.replace(row, prior_std=stated.get(row.name, row.prior_std)))
-
-
-def _with_rows(vehicle: AbstractVehicle, change: Callable[[Parameter], Parameter]) -> AbstractVehicle:
-    layout = dataclasses.replace(vehicle.layout, parameters=tuple(map(change, vehicle.layout.parameters)))
-    return dataclasses.replace(vehicle, layout=layout)
+    return vehicle.with_rows(lambda row: dataclasses.replace(row, prior_std=stated.get(row.name, row.prior_std)))
